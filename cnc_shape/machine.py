@@ -1,0 +1,60 @@
+"""Machine: what a machine is made of. Its shapers, gains and kinematics live above."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from cnc_shape.limits import Limits
+from cnc_shape.modes import Mode
+from cnc_shape.program import ROTARY
+from cnc_shape.units import DEGREE
+
+
+@dataclass(frozen=True, slots=True)
+class IdealDrive:
+    """A drive that is where it is told to be."""
+
+
+@dataclass(frozen=True, slots=True)
+class FirstOrderLag:
+    """A velocity drive ``v' = (gain * u - v) / time_constant``, ``q' = v`` (paper 004, eq 14)."""
+
+    time_constant: float  # s
+    gain: float = 1.0  # -
+
+
+Drive: TypeAlias = IdealDrive | FirstOrderLag
+
+LINEAR_DEFAULT = Limits(velocity=200.0, acceleration=2000.0)  # mm/s, mm/s^2
+ROTARY_DEFAULT = Limits(velocity=90.0 * DEGREE, acceleration=900.0 * DEGREE)  # rad/s, rad/s^2
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One Cartesian or rotary axis: what it may do, what moves it, and what vibrates behind it."""
+
+    name: str
+    limits: Limits
+    drive: Drive = IdealDrive()
+    modes: tuple[Mode, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """The axes of a machine."""
+
+    name: str
+    axes: tuple[Axis, ...]
+
+    def axis(self, name: str) -> Axis:
+        """Return the axis called `name`; an axis the machine lacks is ideal, without travel limits."""
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        return Axis(name, ROTARY_DEFAULT if name in ROTARY else LINEAR_DEFAULT)
+
+    def with_axes(self, names: Iterable[str]) -> Machine:
+        """Return the machine with just the axes `names`, in that order."""
+        return replace(self, axes=tuple(self.axis(name) for name in names))

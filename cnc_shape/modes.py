@@ -1,0 +1,56 @@
+"""A vibration mode of the structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
+from cnc_shape.errors import OptionError
+from cnc_shape.units import TWO_PI
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One flexible mode between drive and tool.
+
+    ``d'' + 2 zeta omega d' + omega^2 d = -participation * q''``, where ``q`` is the drive's position
+    and ``d`` the deflection that adds to the tool.
+
+    Raises
+    ------
+    OptionError
+        Frequency not positive, damping ratio outside [0, 1), or a value that is not finite.
+    """
+
+    natural_frequency: float  # Hz, undamped
+    damping_ratio: float  # -, 0 <= zeta < 1
+    participation: float = 1.0  # -, share of the drive's acceleration that excites the mode
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.natural_frequency) and self.natural_frequency > 0.0):
+            raise OptionError(
+                f"a mode's frequency must be positive, not {self.natural_frequency} Hz",
+                hint="give the undamped natural frequency in Hz",
+            )
+        if not 0.0 <= self.damping_ratio < 1.0:
+            raise OptionError(
+                f"a damping ratio must be at least 0 and below 1, not {self.damping_ratio}",
+                hint="structures of steel and aluminium have 0.005 to 0.1",
+            )
+        if not isfinite(self.participation):
+            raise OptionError(f"a mode's participation must be finite, not {self.participation}")
+
+    @property
+    def omega(self) -> float:
+        """Undamped angular frequency, rad/s."""
+        return TWO_PI * self.natural_frequency
+
+    @property
+    def omega_damped(self) -> float:
+        """Damped angular frequency, rad/s."""
+        return self.omega * sqrt(1.0 - self.damping_ratio**2)
+
+    @property
+    def damped_period(self) -> float:
+        """Period of the damped vibration, s."""
+        return TWO_PI / self.omega_damped
