@@ -170,8 +170,12 @@ def _advance(
     if not last:
         settled = int(np.searchsorted(u, u[-1] - reach, side="right")) - 1
         finish = max(done, settled, int(stops[-1]) if stops.size else 0)
-    edge, offset, length, rows = cells(line.start, u, ticks, tangent, turn, twist, width, done, finish)
-    edge, offset, length, rows = _with_rests(line, ticks, edge, offset, length, rows, done, finish)
+    places, rows = cells(line.start, u, ticks, tangent, turn, twist, width, done, finish)
+    if last:  # the edge without length at the end of the program is a cell as well
+        places = np.vstack([places, [[len(line) - 1, 0, 0]]])
+        rows = np.concatenate([rows, np.zeros((1, *rows.shape[1:]))])
+        rows[-1, 0] = line.start[-1]
+    edge, offset, length = places.T
 
     anchor = np.maximum.accumulate(np.where(line.stop == 1, u, -origin))  # where u is zero
     first = offset == 0
@@ -198,31 +202,6 @@ def _advance(
     )
     keep = max(stop, int(np.searchsorted(u, u[finish] - reach)) - 2, 0)
     return path, line.cut(slice(keep, None)), finish - keep, int(u[keep] - anchor[keep])
-
-
-def _with_rests(
-    line: Polyline,
-    ticks: IntArray,
-    edge: IntArray,
-    offset: IntArray,
-    length: IntArray,
-    rows: FloatArray,
-    begin: int,
-    finish: int,
-) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-    """Insert a cell of length 0 for each edge without length: the end of the program."""
-    empty = begin + np.flatnonzero(ticks[begin:finish] == 0)
-    if empty.size == 0:
-        return edge, offset, length, rows
-    place = np.searchsorted(edge, empty)
-    rest = np.zeros((empty.size, *rows.shape[1:]))
-    rest[:, 0] = line.start[empty]
-    return (
-        np.insert(edge, place, empty),
-        np.insert(offset, place, 0),
-        np.insert(length, place, 0),
-        np.insert(rows, place, rest, axis=0),
-    )
 
 
 def _frozen_flags(values: BoolArray) -> BoolArray:

@@ -241,15 +241,28 @@ def parts_of(sums, h):
 
 
 @kernel
+def grown(places, rows):
+    """Return both arrays with room for twice as many cells."""
+    count = places.shape[0]
+    more_places = np.empty((2 * count, 3), np.int64)
+    more_rows = np.empty((2 * count, rows.shape[1], rows.shape[2]))
+    for k in range(count):
+        for i in range(3):
+            more_places[k, i] = places[k, i]
+        for p in range(rows.shape[1]):
+            for i in range(rows.shape[2]):
+                more_rows[k, p, i] = rows[k, p, i]
+    return more_places, more_rows
+
+
+@kernel
 def cells(start, u, ticks, tangent, turn, twist, width, begin, finish):
     """Cubic cells from vertex `begin` to vertex `finish`, every one summed afresh from the hats over it.
 
     Returns
     -------
-    edge (c,)
-        Edge the cell lies on.
-    offset, length (c,)
-        Start of the cell after the edge's start, and its length, in ticks.
+    places (c,3)
+        Edge the cell lies on, start of the cell after the edge's start and its length in ticks.
     rows (c,4,d)
         Coefficients of the powers 0 to 3.
     """
@@ -265,10 +278,8 @@ def cells(start, u, ticks, tangent, turn, twist, width, begin, finish):
             for i in range(d):
                 step[hats, i] = tangent[k, i] - tangent[k - 1, i]
             hats += 1
-    capacity = 1024
-    edge = np.empty(capacity, np.int64)
-    offset = np.empty(capacity, np.int64)
-    length = np.empty(capacity, np.int64)
+    capacity = 4 * (finish - begin) + 1024
+    places = np.empty((capacity, 3), np.int64)
     rows = np.empty((capacity, 4, d))
     sums = np.empty((4, d))
     count = 0
@@ -305,16 +316,15 @@ def cells(start, u, ticks, tangent, turn, twist, width, begin, finish):
                 part += 1
                 to = here + (span * part) // parts
                 if count == capacity:
-                    edge = np.concatenate((edge, edge))
-                    offset = np.concatenate((offset, offset))
-                    length = np.concatenate((length, length))
-                    rows = np.concatenate((rows, rows))
+                    places, rows = grown(places, rows)
                     capacity *= 2
-                edge[count] = k
-                offset[count] = at - u[k]
-                length[count] = to - at
-                rows[count] = sums
+                places[count, 0] = k
+                places[count, 1] = at - u[k]
+                places[count, 2] = to - at
+                for p in range(4):
+                    for i in range(d):
+                        rows[count, p, i] = sums[p, i]
                 count += 1
                 at = to
             here = until
-    return edge[:count], offset[:count], length[:count], rows[:count]
+    return places[:count], rows[:count]

@@ -15,22 +15,33 @@ ARC_SHARE = 1.0 / 12.0  # the polygon's unit of error as a share of the path tol
 NO_TRAVEL = 1e-9  # mm, a move with less XYZ travel that turns rotary axes is rotary-only
 COS_REVERSAL = -0.9659258262890683  # cos 165 degrees
 EXACT_PATH_TOLERANCE = 1e-3  # mm, transition where an exact path bends without a corner
+SMALLEST_TOLERANCE = 1e-5  # mm, so that an arc has a bearable number of edges
 COS_EXACT_CORNER = 0.9998476951563913  # cos 1 degree: a sharper corner of an exact path is a stop
 ROTARY_MERGE_TOLERANCE = 1e-4  # rad
 WINDOW = 64  # edges that one chord may replace
+FEW = 4  # edges: a chord that replaces fewer is worth a look for noise
+MANY = 8  # edges: fewer are not a pattern
+NOISE_TURN = 0.1  # -, net turn over the sum of turns, of a run that is noise
 
 
 @kernel
-def arc_radii(start, end, center, normal):
-    """Radius at both ends of an arc and the rise of its end along the normal, mm."""
+def copy_point(source, row, target, to):
+    """Copy one row; written out because a slice assignment compiles for seconds."""
+    for i in range(target.shape[1]):
+        target[to, i] = source[row, i]
+
+
+@kernel
+def arc_radii(start, end, center, normal, r):
+    """Radius at both ends of the arc in row `r`, and the rise of its end along the normal, mm."""
     rise = 0.0
     inner = 0.0
     outer = 0.0
     for i in range(3):
-        rise += (end[i] - start[i]) * normal[i]
+        rise += (end[r, i] - start[r, i]) * normal[r, i]
     for i in range(3):
-        inner += (start[i] - center[i]) ** 2
-        outer += (end[i] - center[i] - rise * normal[i]) ** 2
+        inner += (start[r, i] - center[r, i]) ** 2
+        outer += (end[r, i] - center[r, i] - rise * normal[r, i]) ** 2
     return np.sqrt(inner), np.sqrt(outer), rise
 
 
@@ -100,14 +111,14 @@ def polygonize(
     budgets = np.empty(rows)
     spents = np.zeros(rows)
     for r in range(rows):
-        budgets[r] = tolerance[r]
+        budgets[r] = max(tolerance[r], SMALLEST_TOLERANCE)
         if mode[r] != BLEND or tolerance[r] <= 0.0:
             budgets[r] = EXACT_PATH_TOLERANCE
         if kind[r] == DWELL:
             continue
         counts[r] = 1
         if kind[r] == ARC:
-            inner, outer, rise = arc_radii(start[r], end[r], center[r], normal[r])
+            inner, outer, rise = arc_radii(start, end, center, normal, r)
             count, spents[r] = arc_edges(inner, outer, rise, sweep[r], budgets[r])
             counts[r] = count + 1
         total += counts[r]
@@ -118,7 +129,7 @@ def polygonize(
     o_marks = np.zeros((4, total), np.int64)  # line, stop, alone, row
     n = 0
     direction = np.empty(d)
-    point = np.empty(d)
+    point = np.empty((1, d))
     for r in range(rows):
         if kind[r] == DWELL:
             flags[4] = 1
@@ -129,9 +140,9 @@ def polygonize(
         alone = False
         if kind[r] == ARC:
             count = counts[r] - 1
-            inner, outer, rise = arc_radii(start[r], end[r], center[r], normal[r])
+            inner, outer, rise = arc_radii(start, end, center, normal, r)
             lift = 1.0 / np.cos(0.5 * sweep[r] / count)
-            o_start[n] = start[r]
+            copy_point(start, r, o_start, n)
             o_values[0, n] = arc_length[r]
             for k in range(count):
                 share = (k + 0.5) / count
@@ -146,20 +157,20 @@ def polygonize(
                     side = normal[r, j] * (start[r, m] - center[r, m]) - normal[r, m] * (
                         start[r, j] - center[r, j]
                     )
-                    point[i] = center[r, i] + c * arm + s * side + rise * share * normal[r, i]
+                    point[0, i] = center[r, i] + c * arm + s * side + rise * share * normal[r, i]
                 for i in range(3, d):
-                    point[i] = start[r, i] + (end[r, i] - start[r, i]) * share
-                o_end[n] = point
+                    point[0, i] = start[r, i] + (end[r, i] - start[r, i]) * share
+                copy_point(point, 0, o_end, n)
                 o_values[1, n] = travel * (0.5 if k == 0 else 1.0) / count
                 n += 1
-                o_start[n] = point
+                copy_point(point, 0, o_start, n)
                 o_values[0, n] = arc_length[r] + travel * share
-            o_end[n] = end[r]
+            copy_point(end, r, o_end, n)
             o_values[1, n] = travel * 0.5 / count
             n += 1
         else:
-            o_start[n] = start[r]
-            o_end[n] = end[r]
+            copy_point(start, r, o_start, n)
+            copy_point(end, r, o_end, n)
             o_values[0, n] = arc_length[r]
             o_values[1, n] = travel
             square = 0.0
@@ -212,12 +223,11 @@ def polygonize(
 
 
 @kernel
-def chord_reach(start, end, first, stop, tolerance, noise_only):
+def chord_reach(start, end, first, stop, tolerance):
     """Return how many edges from `first` on one chord may replace, and its distance from them, mm.
 
     Extends the chord edge by edge, at most to `stop`, while every vertex it skips is within `tolerance`,
-    passed in order, and no rotary axis is off by more than its own tolerance. With `noise_only` the
-    vertices must also turn to and fro: their turns add up to less than a tenth of their sizes.
+    passed in order, and no rotary axis is off by more than its own tolerance.
     """
     d = start.shape[1]
     best = 1
@@ -239,48 +249,47 @@ def chord_reach(start, end, first, stop, tolerance, noise_only):
             for i in range(3):
                 progress += (end[k, i] - start[first, i]) * chord[i]
             progress /= square
-            if progress < before or progress > 1.0:
-                kept = False
-                break
+            kept = before <= progress <= 1.0
             before = progress
             off = 0.0
             for i in range(d):
                 miss = end[k, i] - start[first, i] - progress * chord[i]
                 if i < 3:
                     off += miss * miss
-                elif abs(miss) > ROTARY_MERGE_TOLERANCE:
-                    kept = False
+                else:
+                    kept = kept and abs(miss) <= ROTARY_MERGE_TOLERANCE
             worst = max(worst, off)
-            if off > tolerance * tolerance:
+            if not kept or off > tolerance * tolerance:
                 kept = False
-            if not kept:
                 break
         if not kept:
             break
         best = last - first + 1
         distance = np.sqrt(worst)
-    if noise_only and best > 1:
-        sizes = 0.0
-        total = np.zeros(3)
-        before_v = np.zeros(3)
-        for k in range(first, first + best):
-            length = 0.0
-            for i in range(3):
-                length += (end[k, i] - start[k, i]) ** 2
-            length = max(np.sqrt(length), 1e-300)
-            size = 0.0
-            for i in range(3):
-                tangent = (end[k, i] - start[k, i]) / length
-                if k > first:
-                    turn = tangent - before_v[i]
-                    size += turn * turn
-                    total[i] += turn
-                before_v[i] = tangent
-            sizes += np.sqrt(size)
-        net = np.sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)
-        if best < 8 or net > 0.1 * sizes:
-            return 1, 0.0
     return best, distance
+
+
+@kernel
+def turns_to_and_fro(start, end, first, after):
+    """Tell whether the turns of a run of edges cancel: their sum is below a tenth of their sizes'."""
+    sizes = 0.0
+    total = np.zeros(3)
+    before = np.zeros(3)
+    for k in range(first, after):
+        length = 0.0
+        for i in range(3):
+            length += (end[k, i] - start[k, i]) ** 2
+        length = max(np.sqrt(length), 1e-300)
+        size = 0.0
+        for i in range(3):
+            tangent = (end[k, i] - start[k, i]) / length
+            if k > first:
+                size += (tangent - before[i]) ** 2
+                total[i] += tangent - before[i]
+            before[i] = tangent
+        sizes += np.sqrt(size)
+    net = np.sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)
+    return net <= NOISE_TURN * sizes
 
 
 @kernel
@@ -319,10 +328,10 @@ def merge(start, end, tolerance, merge_tolerance, noise_tolerance, feed_rate, st
         count = 1
         off = 0.0
         if limit > k + 1:
-            count, off = chord_reach(start, end, k, limit, merge_tolerance[k], False)
-            if count <= 3 and noise_tolerance[k] > merge_tolerance[k]:
-                noise, noise_off = chord_reach(start, end, k, limit, noise_tolerance[k], True)
-                if noise > count:
+            count, off = chord_reach(start, end, k, limit, merge_tolerance[k])
+            if count < FEW and noise_tolerance[k] > merge_tolerance[k]:
+                noise, noise_off = chord_reach(start, end, k, limit, noise_tolerance[k])
+                if noise >= MANY and turns_to_and_fro(start, end, k, k + noise):
                     count = noise
                     off = noise_off
         first[n] = k
