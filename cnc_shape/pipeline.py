@@ -139,9 +139,7 @@ def pick_cases(setup: Setup, names: Sequence[str]) -> tuple[Case, ...]:
         if name in ("contour_shaped", "path_shaped"):
             raise OptionError(f"the case {name} is not built yet", hint="axis_shaped is")
         if name not in known:
-            raise OptionError(
-                f"this machine has no case called {name!r}", hint="it has " + ", ".join(known)
-            )
+            raise OptionError(f"this machine has no case called {name!r}", hint="it has " + ", ".join(known))
     return tuple(known[name] for name in names)
 
 
@@ -200,10 +198,21 @@ class Trial:
         axes = [axis.name for axis in self._machine.axes]
         command, drives, tool = (Deviation(t.rms, t.max, t.line) for t in self._tallies)
         following = {
-            axis: sqrt(total / self._samples) for axis, total in zip(axes, self._following.tolist(), strict=True)
+            axis: sqrt(total / self._samples)
+            for axis, total in zip(axes, self._following.tolist(), strict=True)
         }
         residual = dict(zip(axes, self._simulated.residual.tolist(), strict=True))
         return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual)
 
 
-__all__ = ["Case", "CaseSummary", "ContourError", "Deviation", "Iterable", "Response", "Run", "Summary", "Trial"]
+__all__ = [
+    "Case",
+    "CaseSummary",
+    "ContourError",
+    "Deviation",
+    "Iterable",
+    "Response",
+    "Run",
+    "Summary",
+    "Trial",
+]
