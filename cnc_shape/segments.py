@@ -132,4 +132,4 @@ def _arc_boxes(start: FloatArray, end: FloatArray, arcs: FloatArray) -> FloatArr
     short = angle <= np.pi
     middle = np.where(short[:, None], 0.5 * (start + end), center + half_rise[:, None] * normal)
     ball = np.where(short, 0.5 * chord + change, np.hypot(radius + change, half_rise))
-    return np.hstack([middle - ball[:, None], middle + ball[:, None]])
+    return frozen(np.hstack([middle - ball[:, None], middle + ball[:, None]]))

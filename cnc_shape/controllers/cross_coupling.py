@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from cnc_shape.arrays import FloatArray
 from cnc_shape.kernels import kernel
 
 
@@ -27,7 +28,7 @@ class CrossCouplingGains(NamedTuple):
 
 
 @kernel
-def step(gains, tracking, tangent, drive):  # type: ignore[no-untyped-def]
+def step(gains: CrossCouplingGains, tracking: FloatArray, tangent: FloatArray, drive: FloatArray) -> None:
     """Add ``Kc eps`` to the Cartesian velocity command.
 
     tracking (3,) mm, command minus actual; tangent (3,) unit, of the command; drive (>=3,) mm/s.

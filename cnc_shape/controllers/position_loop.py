@@ -15,7 +15,7 @@ class PositionGains(NamedTuple):
 
 
 @kernel
-def step(gains, following, drive):  # type: ignore[no-untyped-def]
+def step(gains: PositionGains, following: FloatArray, drive: FloatArray) -> None:
     """Add ``Kp (q_command - q)`` to the velocity command. following, drive (j,) mm, mm/s."""
     for j in range(drive.size):
         drive[j] += gains.proportional[j] * following[j]

@@ -232,8 +232,8 @@ def nearest_on_spiral(radius, g, h, rho, theta, z, low, high, reach_v2):
     if d_v2 < best:
         best, best_angle = d_v2, high
     convex = min(radius + g * low, radius + g * high) > 4.0 * abs(g)
-    turn_low = int(ceil((low - theta - CORE) / TWO_PI))
-    turn_high = int(floor((high - theta + CORE) / TWO_PI))
+    turn_low = ceil((low - theta - CORE) / TWO_PI)
+    turn_high = floor((high - theta + CORE) / TWO_PI)
     for turn in range(turn_low, turn_high + 1):
         a = max(low, theta + TWO_PI * turn - CORE)
         b = min(high, theta + TWO_PI * turn + CORE)
