@@ -50,7 +50,11 @@ def travel_lengths(program: Program) -> FloatArray:
     arcs = np.flatnonzero(program.motion == Motion.ARC)
     if arcs.size:
         length[arcs] = _arc_lengths(
-            start[arcs, :3], program.target[arcs, :3], program.center[arcs], program.normal[arcs], program.sweep[arcs]
+            start[arcs, :3],
+            program.target[arcs, :3],
+            program.center[arcs],
+            program.normal[arcs],
+            program.sweep[arcs],
         )
     return length
 

@@ -1,0 +1,58 @@
+"""Slow twins of the kernels: the definition itself, in plain numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# --- contour error --------------------------------------------------------------------------------
+
+
+def curve_points(toolpath, row, shares):
+    """Points of a segment at shares of its angle (arcs) or length (lines), (k,3), from its programmed form."""
+    start, end = toolpath.start[row, :3], toolpath.end[row, :3]
+    if toolpath.kind[row] != 2:
+        return start + shares[:, None] * (end - start)
+    center, normal, sweep = toolpath.center[row], toolpath.normal[row], toolpath.sweep[row]
+    arm = start - center
+    side = np.cross(normal, arm)
+    rise = (end - start) @ normal
+    outer = np.linalg.norm(end - center - rise * normal) / np.linalg.norm(arm)
+    growth = 1.0 + (outer - 1.0) * shares
+    angle = sweep * shares
+    plane = np.cos(angle)[:, None] * arm + np.sin(angle)[:, None] * side
+    return center + growth[:, None] * plane + shares[:, None] * rise * normal
+
+
+def places(toolpath, row, shares):
+    """Path length at shares of a segment, by the trapezoid rule on a fine polyline."""
+    low, high = toolpath.arc_length[row], toolpath.arc_length[row + 1]
+    if toolpath.kind[row] != 2:
+        return low + shares * (high - low)
+    fine = np.linspace(0.0, 1.0, 20_001)
+    steps = np.linalg.norm(np.diff(curve_points(toolpath, row, fine), axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    return low + (high - low) * np.interp(shares, fine, along / along[-1])
+
+
+def contour_distance(point, toolpath, lower=-np.inf, upper=np.inf, count=2001, rounds=4):
+    """Least distance to the toolpath's points within the window: a fine grid, refined around its best."""
+    best = np.inf
+    total = toolpath.arc_length[-1]
+    lower, upper = min(max(lower, 0.0), total), max(min(upper, total), 0.0)
+    for row in range(len(toolpath)):
+        if toolpath.arc_length[row + 1] <= toolpath.arc_length[row]:
+            continue
+        grid = np.linspace(0.0, 1.0, count)
+        along = places(toolpath, row, grid)
+        inside = (along >= lower - 1e-12) & (along <= upper + 1e-12)
+        low = np.interp(lower, along, grid) if along[0] < lower < along[-1] else 0.0
+        high = np.interp(upper, along, grid) if along[0] < upper < along[-1] else 1.0
+        if not inside.any() and not (along[0] <= lower and upper <= along[-1]):
+            continue
+        shares = np.linspace(low, high, count)
+        for _ in range(rounds):
+            distance = np.linalg.norm(curve_points(toolpath, row, shares) - point, axis=1)
+            best = min(best, distance.min())
+            middle, width = shares[distance.argmin()], 2.0 * (shares[1] - shares[0])
+            shares = np.linspace(max(low, middle - width), min(high, middle + width), count)
+    return best
