@@ -1,1 +1,1 @@
-"""Writers: values to files, whole or not at all."""
+"""Writers: results that are whole or absent, read back before they are published."""
