@@ -184,9 +184,7 @@ def _modes(source: str, tree: Tree, axis: str, models: list[ModeModel]) -> tuple
     without = [index for index, model in enumerate(models) if model.participation is None]
     if without and given >= 1.0:
         place, _ = locate(tree, ("axes", axis, "modes", without[0]))
-        reason = (
-            f"axes.{axis}.modes[{without[0]}]: nothing is left for it, the participations add up to {given:g}"
-        )
+        reason = f"axes.{axis}.modes[{without[0]}]: the other participations leave nothing of 1: {given:g}"
         refuse(source, place, reason, "give this mode a participation: of its own")
     share = (1.0 - given) / len(without) if without else 0.0
     return tuple(

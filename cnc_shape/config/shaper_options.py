@@ -82,7 +82,7 @@ def design(choice: ShaperChoice, modes: Sequence[Mode]) -> Shaper:
     OptionError
         Options that make no shaper of these modes.
     """
-    function = FUNCTIONS[choice.type]
+    function: Callable[..., Any] = FUNCTIONS[choice.type]
     keys = _options(function)
     values = {keys[key][0]: _value(value) for key, value in choice.options.items()}
     if choice.type in SINGLE_MODE:
