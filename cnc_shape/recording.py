@@ -1,7 +1,7 @@
 """Recording: the samples of a case that its report keeps, in bounded memory.
 
-Up to `KEPT` samples all are kept. A longer motion is kept in buckets of equal width, two samples each:
-the one where the tool is farthest from the path, and the one where it is nearest, in order of time. The width is
+Up to `KEPT` samples all are kept. A longer motion is kept in buckets of equal width, two samples each: the
+one where the tool is farthest from the path, and the one where it is nearest, in order of time. The width is
 a power of two that goes with the number of samples, and the best of two buckets is the best of their
 bests: so what is kept does not depend on how the samples came in chunks. The worst place always stays.
 """
@@ -15,8 +15,12 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.contour import ContourError
+from cnc_shape.kernels.foot_point import points_at
+from cnc_shape.segments import segments
 from cnc_shape.simulation import Response
+from cnc_shape.toolpath import Toolpath
 
+OUTLINE_ANGLE = 0.05  # rad, of a chord that stands for an arc in a drawing
 KEPT = 2_000_000  # samples of a case that are kept as they are
 DECIMATED = 200_000  # samples that a longer motion is thinned to, at most
 
@@ -37,6 +41,7 @@ class Signals:
     command_error: FloatArray  # (n,) mm, contour error of the command
     drive_error: FloatArray  # (n,) mm
     tool_error: FloatArray  # (n,) mm
+    foot: FloatArray  # (n,3) mm, the path's nearest point to the tool
     line: IntArray  # (n,) source line of the foot point of the tool
 
     def __post_init__(self) -> None:
@@ -52,7 +57,7 @@ class Recorder:
         self._kept = kept
         self._most = max(kept * DECIMATED // KEPT, 4)
         self._waiting: list[FloatArray] = []  # rows of samples whose contour error is not decided yet
-        self._table: list[FloatArray] = []  # rows: index, command, position, tool, v, a, errors, line
+        self._table: list[FloatArray] = []  # rows: index, command, position, tool, v, a, foot, errors, line
         self._rows = 0
         self._count = 0
 
@@ -74,21 +79,21 @@ class Recorder:
         self._waiting = [rows[decided:]]
         index = np.arange(self._count, self._count + decided)
         distances = [error.distance for error in errors]
-        self._append(np.column_stack([index, rows[:decided], *distances, errors[-1].line]))
+        self._append(np.column_stack([index, rows[:decided], errors[-1].foot, *distances, errors[-1].line]))
         self._count += decided
 
     def signals(self) -> Signals:
         """What was kept, as one value; call it after the last block."""
         d = len(self._axes)
-        table = np.concatenate(self._table) if self._table else np.zeros((0, 5 * d + 5))
+        table = np.concatenate(self._table) if self._table else np.zeros((0, 5 * d + 8))
         width = self._width(self._count)
         if width > 1:
             table = _thin(table, width)
         parts = [frozen(table[:, 1 + k * d : 1 + (k + 1) * d]) for k in range(5)]
-        errors = [frozen(table[:, 5 * d + 1 + k]) for k in range(3)]
+        errors = [frozen(table[:, 5 * d + 4 + k]) for k in range(3)]
         return Signals(
             self._case, self._axes, max(width // 2, 1), frozen(table[:, 0] * self._sample_time),
-            *parts, *errors, frozen_integers(table[:, -1]),
+            *parts, *errors, frozen(table[:, 5 * d + 1 : 5 * d + 4]), frozen_integers(table[:, -1]),
         )  # fmt: skip
 
     def _width(self, count: int) -> int:
@@ -109,6 +114,33 @@ class Recorder:
         complete = int(np.searchsorted(whole[:, 0], after - after % width))
         whole = np.concatenate([_thin(whole[:complete], width), whole[complete:]])
         self._table, self._rows = [whole], whole.shape[0]
+
+
+class Outline:
+    """Collects the programmed path as a polyline to draw."""
+
+    def __init__(self) -> None:
+        self._points: list[FloatArray] = []
+
+    def add(self, toolpath: Toolpath) -> None:
+        """Take the next chunk of the path; arcs are chopped into chords."""
+        path = segments(toolpath, first=not self._points)
+        if path.low.size == 0:
+            return
+        chords = np.ones(path.low.size, dtype=np.int64)
+        turns = path.arc >= 0
+        chords[turns] = np.ceil(path.arcs[:, 15] / OUTLINE_ANGLE).astype(np.int64)
+        row = np.repeat(np.arange(chords.size), chords)
+        share = (np.arange(row.size) - np.repeat(np.cumsum(chords) - chords, chords) + 1) / chords[row]
+        place = path.low[row] + share * (path.high[row] - path.low[row])
+        points = points_at(
+            frozen(place), frozen_integers(row), path.start, path.end, path.low, path.high, path.arc, path.arcs
+        )
+        self._points.append(points if self._points else np.vstack([path.start[:1], points]))
+
+    def points(self) -> FloatArray:
+        """The polyline, (p,3) mm."""
+        return frozen(np.concatenate(self._points) if self._points else np.zeros((0, 3)))
 
 
 def _thin(table: FloatArray, width: int) -> FloatArray:

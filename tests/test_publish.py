@@ -52,9 +52,14 @@ def test_an_existing_file_needs_force(tmp_path):
 
 def test_a_file_that_appears_meanwhile_is_not_overwritten(tmp_path):
     target = tmp_path / "out.csv"
-    with pytest.raises(OutputError, match="exists"), publishing(target) as file:
-        file.write(b"mine")
-        target.write_bytes(b"theirs")
+
+    def race() -> None:
+        with publishing(target) as file:
+            file.write(b"mine")
+            target.write_bytes(b"theirs")
+
+    with pytest.raises(OutputError, match="exists"):
+        race()
     assert target.read_bytes() == b"theirs"
     assert names(tmp_path) == ["out.csv"]
 
@@ -111,9 +116,14 @@ def test_a_fault_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, ste
     if old is not None:
         target.write_bytes(old)
     calls = fail_at(monkeypatch, step, call)
-    with pytest.raises(OutputError, match=r"out\.bin"), publishing(target, force=True) as file:
-        for _ in range(50):
-            file.write(b"new" * 1000)
+
+    def write() -> None:
+        with publishing(target, force=True) as file:
+            for _ in range(50):
+                file.write(b"new" * 1000)
+
+    with pytest.raises(OutputError, match=r"out\.bin"):
+        write()
     assert len(calls) >= call
     assert names(tmp_path) == ([] if old is None else ["out.bin"])
     assert old is None or target.read_bytes() == old
@@ -148,9 +158,13 @@ def test_a_real_limit_on_the_file_size_leaves_nothing_behind(tmp_path):
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError, OSError])
 def test_an_error_of_the_block_stays_itself_and_leaves_nothing(tmp_path, error):
-    with pytest.raises(error) as caught, publishing(tmp_path / "out.bin") as file:
-        file.write(b"half")
-        raise error
+    def write() -> None:
+        with publishing(tmp_path / "out.bin") as file:
+            file.write(b"half")
+            raise error
+
+    with pytest.raises(error) as caught:
+        write()
     assert type(caught.value) is error
     assert names(tmp_path) == []
 

@@ -43,9 +43,7 @@ def gains(feedforward: Feedforward, axes: Sequence[Axis]) -> FeedforwardGains:
 
 
 @kernel
-def step(
-    gains: FeedforwardGains, velocity: FloatArray, acceleration: FloatArray, drive: FloatArray
-) -> None:
+def step(gains: FeedforwardGains, velocity: FloatArray, acceleration: FloatArray, drive: FloatArray) -> None:
     """Add the model's input for the coming sample.
 
     velocity (j,) mm/s and acceleration (j,) mm/s^2 are averages over the coming sample: the value at

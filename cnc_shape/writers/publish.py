@@ -206,8 +206,8 @@ def _check_folder(target: Path, marker: str, *, force: bool) -> None:
         raise OutputError(f"{target} is a symbolic link", hint="name the folder it points to")
     if not stat.S_ISDIR(mode):
         raise OutputError(f"{target} is a file", hint="name a folder")
-    with _faults_of(target), os.scandir(target) as entries:
-        empty = next(entries, None) is None
+    with _faults_of(target):
+        empty = not os.listdir(target)
     if empty:
         return
     if not (target / marker).is_file():
