@@ -1,7 +1,7 @@
 """Recording: the samples of a case that its report keeps, in bounded memory.
 
-Up to `KEPT` samples all are kept. A longer motion is kept in buckets of equal width, two samples each:
-the one where the tool is farthest from the path, and the one where it is nearest, in order of time. The width is
+Up to `KEPT` samples all are kept. A longer motion is kept in buckets of equal width, two samples each: the
+one where the tool is farthest from the path, and the one where it is nearest, in order of time. The width is
 a power of two that goes with the number of samples, and the best of two buckets is the best of their
 bests: so what is kept does not depend on how the samples came in chunks. The worst place always stays.
 """
@@ -37,6 +37,7 @@ class Signals:
     command_error: FloatArray  # (n,) mm, contour error of the command
     drive_error: FloatArray  # (n,) mm
     tool_error: FloatArray  # (n,) mm
+    foot: FloatArray  # (n,3) mm, the path's nearest point to the tool
     line: IntArray  # (n,) source line of the foot point of the tool
 
     def __post_init__(self) -> None:
@@ -52,7 +53,7 @@ class Recorder:
         self._kept = kept
         self._most = max(kept * DECIMATED // KEPT, 4)
         self._waiting: list[FloatArray] = []  # rows of samples whose contour error is not decided yet
-        self._table: list[FloatArray] = []  # rows: index, command, position, tool, v, a, errors, line
+        self._table: list[FloatArray] = []  # rows: index, command, position, tool, v, a, foot, errors, line
         self._rows = 0
         self._count = 0
 
@@ -74,21 +75,21 @@ class Recorder:
         self._waiting = [rows[decided:]]
         index = np.arange(self._count, self._count + decided)
         distances = [error.distance for error in errors]
-        self._append(np.column_stack([index, rows[:decided], *distances, errors[-1].line]))
+        self._append(np.column_stack([index, rows[:decided], errors[-1].foot, *distances, errors[-1].line]))
         self._count += decided
 
     def signals(self) -> Signals:
         """What was kept, as one value; call it after the last block."""
         d = len(self._axes)
-        table = np.concatenate(self._table) if self._table else np.zeros((0, 5 * d + 5))
+        table = np.concatenate(self._table) if self._table else np.zeros((0, 5 * d + 8))
         width = self._width(self._count)
         if width > 1:
             table = _thin(table, width)
         parts = [frozen(table[:, 1 + k * d : 1 + (k + 1) * d]) for k in range(5)]
-        errors = [frozen(table[:, 5 * d + 1 + k]) for k in range(3)]
+        errors = [frozen(table[:, 5 * d + 4 + k]) for k in range(3)]
         return Signals(
             self._case, self._axes, max(width // 2, 1), frozen(table[:, 0] * self._sample_time),
-            *parts, *errors, frozen_integers(table[:, -1]),
+            *parts, *errors, frozen(table[:, 5 * d + 1 : 5 * d + 4]), frozen_integers(table[:, -1]),
         )  # fmt: skip
 
     def _width(self, count: int) -> int:

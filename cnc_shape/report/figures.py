@@ -85,22 +85,20 @@ def _plane(run: Run) -> tuple[int, int]:
     return first, second
 
 
-def _magnified(signals: Signals, feet: FloatArray, factor: float, rows: IntArray) -> FloatArray:
-    return feet[rows] + factor * (signals.tool[rows, :3] - feet[rows])
+def _magnified(signals: Signals, factor: float, rows: IntArray) -> FloatArray:
+    foot = signals.foot[rows]
+    return foot + factor * (signals.tool[rows, :3] - foot)
 
 
-def path_figure(run: Run, feet: Mapping[str, FloatArray]) -> Figure:
-    """Programmed path, and the tool of every case with its contour error magnified.
-
-    feet: case name to the (n,3) foot points of its kept samples.
-    """
+def path_figure(run: Run) -> Figure:
+    """Programmed path, and the tool of every case with its contour error magnified."""
     factor, (i, j) = _magnification(run), _plane(run)
     count = len(run.signals)
     figure, axes = _figure(3.4 * count + 0.3, 3.9, 1, count, sharex=True, sharey=True)
     for ax, signals, colour in zip(axes, run.signals, COLOURS, strict=False):
         ax.plot(run.path[:, i], run.path[:, j], color=PATH_COLOUR, linewidth=0.8)
         rows = worst_rows(signals.tool_error, DRAWN_PATH // 2)
-        drawn = _magnified(signals, feet[signals.case], factor, rows)
+        drawn = _magnified(signals, factor, rows)
         ax.plot(drawn[:, i], drawn[:, j], color=colour, linewidth=0.9)
         worst = signals.tool_error.max(initial=0.0) / MICROMETRE
         ax.set_title(f"{signals.case}\ntool max {worst:.3g} µm")
