@@ -79,4 +79,3 @@ class Run:
     def signal(self, case: str) -> Signals:
         """Return the signals of the case called `case`."""
         return next(signals for signals in self.signals if signals.case == case)
-
