@@ -89,7 +89,9 @@ def simulating(
         state: SimulationState | None, command: Trajectory, last: bool
     ) -> tuple[SimulationState | None, Response]:
         if state is None and len(command) == 0:
-            return None, Response(command, command.position, command.position, command.position, command.position)
+            return None, Response(
+                command, command.position, command.position, command.position, command.position
+            )
         now = _start(plant, command, control) if state is None else _copy(state)
         command = _join(now.held, command)
         ticks = len(command) if last else max(len(command) - 1, 0)
