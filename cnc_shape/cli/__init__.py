@@ -18,9 +18,10 @@ import typer
 
 from cnc_shape import __version__
 from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
+from cnc_shape.cli.init import init
 from cnc_shape.cli.output import print_text
 
-COMMANDS: Final[tuple[Callable[..., int | None], ...]] = ()
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (init,)
 
 app = typer.Typer(
     name="cnc-shape",

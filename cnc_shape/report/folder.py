@@ -39,12 +39,13 @@ class Context:
     """What a run was made from; nothing in it may depend on the time or the place of the run."""
 
     command: Sequence[str] = ()  # the command line, without paths of this machine's own
-    inputs: Mapping[str, bytes] = field(default_factory=dict[str, bytes])  # name: content of every file read
+    inputs: Mapping[str, str] = field(default_factory=dict[str, str])  # name: SHA-256 of every file read
     machine: str = ""  # resolved machine file, YAML
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper])
     modes: Mapping[str, Sequence[Mode]] = field(default_factory=dict[str, Sequence[Mode]])
     warnings: Sequence[str] = ()
     figure_format: figures.Format = "svg"
+    program: Path | None = None  # where the program's text lies, to show its worst lines
 
 
 NO_CONTEXT = Context()
@@ -93,8 +94,7 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
         _require_finite(signals)
     drawn = draw(run, context)
     svg = {name: figures.render(figure, "svg") for name, figure in drawn.items()}
-    source = context.inputs.get(run.summary.program, b"")
-    page = Page(svg, context.shapers, context.modes, context.warnings, source, context.machine)
+    page = Page(svg, context.shapers, context.modes, context.warnings, context.program, context.machine)
     kind = context.figure_format
     content = {
         "report.html": _encoded(render_html(run, page)),
@@ -178,7 +178,7 @@ def _run_json(context: Context) -> bytes:
             "schema": "cnc-shape/run/1",
             "versions": versions(),
             "command": list(context.command),
-            "inputs": {name: hashlib.sha256(data).hexdigest() for name, data in context.inputs.items()},
+            "inputs": dict(context.inputs),
             "machine_sha256": hashlib.sha256(_encoded(context.machine)).hexdigest(),
             "warnings": list(context.warnings),
         }

@@ -7,6 +7,8 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from cnc_shape import __version__
@@ -37,7 +39,7 @@ class Page:
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper])  # of every shaped axis
     modes: Mapping[str, Sequence[Mode]] = field(default_factory=dict[str, Sequence[Mode]])
     warnings: Sequence[str] = ()  # of the reader and the machine file
-    source: bytes = b""  # the program
+    program: Path | None = None  # where the program's text lies
     machine: str = ""  # the machine file
 
 
@@ -97,19 +99,20 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         shaper_figure=pictures.get("shapers"),
         first=one_line(summary.cases[0].name),
         worst_case=one_line(best.name),
-        worst=_place_rows(run, best.name, page.source) if run.signals else [],
+        worst=_place_rows(run, best.name, page.program) if run.signals else [],
         warnings=[one_line(warning) for warning in page.warnings],
         machine=page.machine,
         factor=max((signals.factor for signals in run.signals), default=1),
     )
 
 
-def _place_rows(run: Run, case: str, source: bytes) -> list[dict[str, Any]]:
-    lines = source.split(b"\n") if source else []
+def _place_rows(run: Run, case: str, program: Path | None) -> list[dict[str, Any]]:
+    places = worst_places(run, case)
+    text = _program_lines(program, {place.line for place in places})
     return [
         {
             "line": place.line,
-            "text": _line_text(lines, place.line),
+            "text": text.get(place.line, ""),
             "numbers": (
                 micrometres(place.error),
                 micrometres(place.drive_error),
@@ -118,15 +121,28 @@ def _place_rows(run: Run, case: str, source: bytes) -> list[dict[str, Any]]:
                 *(f"{value:.3f}" for value in place.foot.tolist()),
             ),
         }
-        for place in worst_places(run, case)
+        for place in places
     ]
 
 
-def _line_text(lines: Sequence[bytes], line: int) -> str:
-    """Text of a program line, shortened; empty where the program is not at hand."""
-    if not 0 < line <= len(lines):
-        return ""
-    text = one_line(lines[line - 1].decode("utf-8", "backslashreplace").strip())
+def _program_lines(program: Path | None, wanted: set[int]) -> dict[int, str]:
+    """Text of the lines `wanted`, shortened; none where the program is not at hand."""
+    if program is None or not wanted:
+        return {}
+    try:
+        with program.open("rb") as file:
+            found = {
+                number: line
+                for number, line in enumerate(islice(file, max(wanted)), start=1)
+                if number in wanted
+            }
+    except OSError:
+        return {}
+    return {number: _shortened(line) for number, line in found.items()}
+
+
+def _shortened(line: bytes) -> str:
+    text = one_line(line.decode("utf-8", "backslashreplace").strip())
     return text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 1] + "…"
 
 
