@@ -6,9 +6,10 @@ import functools
 import io
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Literal, ParamSpec
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.modes import Mode
@@ -23,6 +24,7 @@ from cnc_shape.units import MICROMETRE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 P = ParamSpec("P")
 Format = Literal["svg", "png", "pdf"]
@@ -57,14 +59,20 @@ def _styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 
 def _figure(
-    width: float, height: float, rows: int = 1, columns: int = 1, **options: bool
+    width: float,
+    height: float,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    sharex: bool = False,
+    sharey: bool = False,
 ) -> tuple[Figure, list[Axes]]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.subplots(rows, columns, squeeze=False, **options)
+    grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return figure, list(grid.ravel())
 
 
@@ -123,11 +131,12 @@ def path_figure(run: Run) -> Figure:
         sharex=True,
         sharey=True,
     )
+    handles: list[Line2D] = []
     for k, (ax, signals) in enumerate(zip(axes, run.signals, strict=False)):
         programmed = ax.plot(run.path[:, i], run.path[:, j], color=PATH_COLOUR, linewidth=2.2, alpha=0.45)
         kept = worst_rows(signals.tool_error, DRAWN_PATH // 2)
         drawn = _magnified(signals, factor, kept)
-        tool = ax.plot(drawn[:, i], drawn[:, j], **{**look(k), "linewidth": 0.8})
+        tool = ax.plot(drawn[:, i], drawn[:, j], **look(k, width=0.8))
         worst = int(signals.tool_error.argmax())
         mark = _magnified(signals, factor, np.array([worst]))
         circle = ax.plot(
@@ -142,8 +151,7 @@ def path_figure(run: Run) -> Figure:
             ax.tick_params(labelbottom=True)
         if k % columns == 0:
             ax.set_ylabel(f"{'XYZ'[j]} (mm)")
-        if k == 0:
-            handles = [programmed[0], tool[0], circle[0]]
+        handles = [programmed[0], tool[0], circle[0]]
     for ax in axes[count:]:
         ax.set_visible(False)
     labels = ["programmed path", f"tool, contour error × {factor:g}", "worst place"]  # noqa: RUF001

@@ -7,7 +7,7 @@ import json
 import string
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cnc_shape import __version__
+from cnc_shape.arrays import FloatArray
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run
@@ -121,15 +122,20 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
 
 
 def _require_finite(signals: Signals) -> None:
-    for name in Signals.__slots__:
-        values = getattr(signals, name)
-        if not isinstance(values, np.ndarray) or np.isfinite(values).all():
-            continue
-        row, *column = np.argwhere(~np.isfinite(values))[0].tolist()
+    for item in fields(Signals):
+        value = getattr(signals, item.name)
+        if isinstance(value, np.ndarray):
+            _check(signals, item.name, np.asarray(value, dtype=np.float64))
+
+
+def _check(signals: Signals, name: str, values: FloatArray) -> None:
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        row, *column = bad[0].tolist()
         axis = f" of {signals.axes[column[0]].upper()}" if column else ""
-        value = values[row, *column]
+        value, time = values[row, *column], signals.time[row]
         raise InfeasibleError(
-            f"{name}{axis} of the case {signals.case} is {value} at t = {signals.time[row]:.6g} s",
+            f"{name}{axis} of the case {signals.case} is {value} at t = {time:.6g} s",
             hint="the motion ran away: lower the gains of its loop, or check its shapers",
         )
 

@@ -62,12 +62,9 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
     environment = Environment(
         autoescape=True, trim_blocks=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
-    summary, best = run.summary, best_case(run.summary)
+    summary, first, best = run.summary, run.summary.cases[0], best_case(run.summary)
     pictures = {
-        name: {
-            "data": base64.b64encode(page.figures[name]).decode(),
-            "caption": caption,
-        }
+        name: {"data": base64.b64encode(page.figures[name]).decode(), "caption": caption}
         for name, caption in CAPTIONS.items()
         if name in page.figures
     }
@@ -85,11 +82,11 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
             ("Servo period", f"{summary.sample_time * 1e3:g} ms"),
             ("Samples", f"{summary.samples:,}".replace(",", "\u202f")),
         ],
-        columns=[(column.name, column.unit, len(column.cells[0])) for column in columns(summary)],
+        columns=[(column.name, column.unit, column.numbers) for column in columns(summary)],
         rows=[
             {
                 "name": one_line(case.name),
-                "best": case is best and len(summary.cases) > 1,
+                "best": case is best and best is not first,
                 "cells": [column.cells[k] for column in columns(summary)],
             }
             for k, case in enumerate(summary.cases)
@@ -97,7 +94,7 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         figures=[picture for name, picture in pictures.items() if name != "shapers"],
         shapers=[_shaper_row(axis, shaper, page.modes[axis]) for axis, shaper in page.shapers.items()],
         shaper_figure=pictures.get("shapers"),
-        first=one_line(summary.cases[0].name),
+        first=one_line(first.name),
         worst_case=one_line(best.name),
         worst=_place_rows(run, best.name, page.program) if run.signals else [],
         warnings=[one_line(warning) for warning in page.warnings],

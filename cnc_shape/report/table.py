@@ -104,8 +104,10 @@ def _flatten(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _guarded(value: Any) -> Any:
-    """Text that a spreadsheet would run as a formula gets an apostrophe in front."""
-    return "'" + value if isinstance(value, str) and value and value[0] in FORMULA_STARTS else value
+    """Text on one line; what a spreadsheet would run as a formula gets an apostrophe in front."""
+    if not isinstance(value, str):
+        return value
+    return ("'" if value[:1] in FORMULA_STARTS and value else "") + one_line(value)
 
 
 def worst_linear(values: Mapping[str, float]) -> float:
@@ -138,6 +140,11 @@ class Column:
     name: str
     unit: str
     cells: tuple[tuple[str, ...], ...]  # a case: one number, or RMS and maximum
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers a cell holds."""
+        return max(len(cell) for cell in self.cells)
 
 
 def columns(summary: Summary) -> tuple[Column, ...]:
@@ -178,7 +185,6 @@ def build_table(summary: Summary, width: int) -> Table:
         stacked, names = True, [_stacked_name(name) for name in names]
         while _width(names, shown, stacked=True) > width and len(shown) > 1:
             shown = shown[:-1]
-    gap = 1 if stacked else 3
     table = Table(
         title=Text(one_line(f"{summary.program} on {summary.machine}")),
         caption=Text(
@@ -191,8 +197,9 @@ def build_table(summary: Summary, width: int) -> Table:
         title_style="bold",
         caption_style="dim",
         header_style="",
-        padding=(0, gap, 0, 0),
+        padding=(0, _gap(stacked=stacked) - 1, 0, 0),  # the box itself draws one more
         pad_edge=False,
+        show_edge=False,
     )
     table.add_column("case", no_wrap=True)
     for column in shown:
@@ -223,13 +230,16 @@ def _stacked_name(name: str) -> str:
     return name.replace("+", "\n+ ")
 
 
+def _gap(*, stacked: bool) -> int:
+    return 1 if stacked else 3
+
+
 def _width(names: Sequence[str], shown: Sequence[Column], *, stacked: bool) -> int:
-    """Columns of the terminal that the table takes, the box's two at the ends included."""
-    gap = 1 if stacked else 3
-    total = 2 + max(len(line) for name in [*names, "case"] for line in name.split("\n"))
+    """How wide the table is."""
+    total = max(len(line) for name in [*names, "case"] for line in name.split("\n"))
     for column in shown:
         lines = [line for cell in _laid_out(column, stacked=stacked) for line in cell.split("\n")]
-        total += gap + max(map(len, [column.name, column.unit, *lines]))
+        total += _gap(stacked=stacked) + max(map(len, [column.name, column.unit, *lines]))
     return total
 
 
