@@ -30,6 +30,7 @@ class Applied:
     cycle_time: float  # s, unshaped
     shaped_time: float  # s
     samples: int
+    sample_time: float  # s
     axes: tuple[str, ...]
     command: Deviation  # contour error of the shaped command
     worst_limit_violation: float  # -, relative excess of the unshaped command; 0: it keeps its limits
@@ -86,6 +87,7 @@ class Application:
             self._cycle_time,
             self._cycle_time + self._longest,
             self._samples,
+            self._sample_time,
             self._axes,
             Deviation(found.rms, found.max, found.line),
             _excess(self._plain),

@@ -10,9 +10,9 @@ import typer
 from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Force, Json, Machine, PathStyle, Quiet
 
 if TYPE_CHECKING:
-    from cnc_shape.cli.inputs import OpenMotion
     from cnc_shape.config.setup import Setup
     from cnc_shape.pipeline import Run
+    from cnc_shape.report.figures import Format
     from cnc_shape.report.folder import Context
 
 SAMPLE = "bracket.nc"
@@ -47,7 +47,7 @@ def simulate(
     """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
-    from cnc_shape.cli.inputs import ReadingOptions, open_motion, warn
+    from cnc_shape.cli.inputs import digest, open_motion, reading_options, warn
     from cnc_shape.cli.output import print_error, print_json
     from cnc_shape.cli.progress import progress
     from cnc_shape.config.bundled import bundled
@@ -63,13 +63,13 @@ def simulate(
     if output is not None:
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
-    options = ReadingOptions(dialect, block_delete, path, closed)
+    options = reading_options(dialect, path, setup, block_delete=block_delete, closed=closed)
     with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
         result = run(motion.blocks, setup, picked, motion.name, record=wanted)
     warnings = [*setup.warnings, *motion.warnings()]
     page = None
     if wanted:
-        context = _context(motion, setup, warnings, cases, kind)
+        context = _context(motion.name, digest(source), setup, warnings, cases, kind)
         page = _report(result, output, context, force=force)
     warn(warnings, quiet=quiet)
     if json:
@@ -83,12 +83,13 @@ def simulate(
     return GATE_FAILED if failures else DONE
 
 
-def _figure_format(text: str):  # noqa: ANN202
+def _figure_format(text: str) -> Format:
     from cnc_shape.errors import OptionError
 
-    if text == "svg" or text == "png" or text == "pdf":
-        return text
-    raise OptionError(f"figures come as svg, png or pdf, not {text!r}")
+    formats: dict[str, Format] = {"svg": "svg", "png": "png", "pdf": "pdf"}
+    if text not in formats:
+        raise OptionError(f"figures come as {', '.join(formats)}, not {text!r}")
+    return formats[text]
 
 
 def _check_folder(folder: Path, *, force: bool) -> None:
@@ -98,21 +99,24 @@ def _check_folder(folder: Path, *, force: bool) -> None:
     check_folder(folder, MARKER, force=force)
 
 
-def _context(motion: OpenMotion, setup: Setup, warnings: list[str], cases: str | None, kind: str) -> Context:
+def _context(
+    name: str, sha256: str, setup: Setup, warnings: list[str], cases: str | None, kind: Format
+) -> Context:
     from cnc_shape.config.dump import dump_machine
     from cnc_shape.config.setup import Shaping
+    from cnc_shape.report.figures import Format
     from cnc_shape.report.folder import Context
 
     shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
-    command = ["simulate", motion.name, *(["--cases", cases] if cases else [])]
+    command = ["simulate", name, *(["--cases", cases] if cases else [])]
     return Context(
         command=command,
-        inputs={motion.name: motion.digest()},
+        inputs={name: sha256},
         machine=dump_machine(setup),
         shapers=shapers,
         modes={axis.name: axis.modes for axis in setup.machine.axes},
         warnings=warnings,
-        figure_format=kind,  # pyright: ignore[reportArgumentType]
+        figure_format=kind,
     )
 
 
