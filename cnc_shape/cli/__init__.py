@@ -17,10 +17,11 @@ from typing import Annotated, Final
 import typer
 
 from cnc_shape import __version__
+from cnc_shape.cli.check import check
 from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
 from cnc_shape.cli.output import print_text
 
-COMMANDS: Final[tuple[Callable[..., int | None], ...]] = ()
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (check,)
 
 app = typer.Typer(
     name="cnc-shape",

@@ -69,10 +69,14 @@ def _target(file: str, output: str | None, *, force: bool) -> Path | None:
         output = f"{stem}.shaped.csv"
     target = Path(output)
     if target.suffix.lower() not in SUFFIXES:
-        hint = "use .csv or .npz" + ("; .nc is not built yet" if target.suffix.lower() in (".nc", ".ngc") else "")
+        hint = "use .csv or .npz" + (
+            "; .nc is not built yet" if target.suffix.lower() in (".nc", ".ngc") else ""
+        )
         raise OptionError(f"cannot write {target.suffix or 'a file without suffix'}: {output}", hint=hint)
     if file != "-" and target.exists() and Path(file).exists() and target.samefile(file):
-        raise OptionError(f"{output} is the input itself", hint="name another output: inputs are never overwritten")
+        raise OptionError(
+            f"{output} is the input itself", hint="name another output: inputs are never overwritten"
+        )
     check_target(target, force=force)
     return target
 

@@ -10,13 +10,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cnc_shape.cli.output import one_line
+from cnc_shape.cli.reading import named_options
 from cnc_shape.config.setup import Setup
-from cnc_shape.errors import OptionError
 from cnc_shape.machine import LINEAR_DEFAULT
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
-from cnc_shape.readers import Curve, ReadingOptions, reading
-from cnc_shape.readers.gcode import Dialect, GcodeOptions
+from cnc_shape.readers import ReadingOptions, reading
 from cnc_shape.readers.trajectories import resample
 
 STANDARD_INPUT = "-"
@@ -47,7 +46,9 @@ class OpenMotion:
         return told
 
 
-def reading_options(dialect: str, path: str, setup: Setup, *, block_delete: bool, closed: bool) -> ReadingOptions:
+def reading_options(
+    dialect: str, path: str, setup: Setup, *, block_delete: bool, closed: bool
+) -> ReadingOptions:
     """Options of the command line as the reader's.
 
     Raises
@@ -55,14 +56,7 @@ def reading_options(dialect: str, path: str, setup: Setup, *, block_delete: bool
     OptionError
         An unknown dialect or way of joining way-points.
     """
-    known = {"auto": None, **{member.value: member for member in Dialect}}
-    if dialect not in known:
-        raise OptionError(f"unknown dialect {dialect!r}", hint="there are " + ", ".join(known))
-    curves = {member.value: member for member in Curve}
-    if path not in curves:
-        raise OptionError(f"--path is {' or '.join(curves)}, not {path!r}")
-    gcode = GcodeOptions(dialect=known[dialect], block_delete=block_delete, tools=setup.tools)
-    return ReadingOptions(gcode=gcode, curve=curves[path], closed=closed)
+    return named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
 
 
 @contextmanager

@@ -21,10 +21,14 @@ SAMPLE = "bracket.nc"
 def simulate(
     file: Annotated[
         str | None,
-        typer.Argument(metavar="[FILE]", help="G-code or CSV; - for standard input; without it the bundled bracket."),
+        typer.Argument(
+            metavar="[FILE]", help="G-code or CSV; - for standard input; without it the bundled bracket."
+        ),
     ] = None,
     machine: Machine = None,
-    report: Annotated[bool, typer.Option("--report", help="Write a run folder with page, figures and signals.")] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write a run folder with page, figures and signals.")
+    ] = False,
     output: Annotated[
         str | None, typer.Option("-o", "--output", metavar="DIR", help="The run folder; implies --report.")
     ] = None,
@@ -58,7 +62,9 @@ def simulate(
     gates = [parse_gate(text) for text in fail_on or []]
     kind = _figure_format(figures)
     setup = load_machine(machine)
-    picked = default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
+    picked = (
+        default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
+    )
     wanted = report or output is not None
     if output is not None:
         _check_folder(Path(output), force=force)
@@ -74,7 +80,9 @@ def simulate(
     warn(warnings, quiet=quiet)
     if json:
         extra = {} if page is None else {"report": str(page)}
-        print_json("simulate", {**{k: v for k, v in summary_json(result.summary).items() if k != "schema"}, **extra})
+        print_json(
+            "simulate", {**{k: v for k, v in summary_json(result.summary).items() if k != "schema"}, **extra}
+        )
     else:
         _print_table(result, page)
     failures = [failure for gate in gates if (failure := gate.failure(result.summary)) is not None]
