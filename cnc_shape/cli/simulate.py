@@ -51,9 +51,9 @@ def simulate(
     from cnc_shape.api import report_context
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
-    from cnc_shape.cli.inputs import reading_options, warn
-    from cnc_shape.cli.output import print_error, print_json
+    from cnc_shape.cli.output import print_error, print_json, warn
     from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.reading import named_options
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.opening import open_motion
@@ -70,7 +70,7 @@ def simulate(
     if output is not None:
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
-    options = reading_options(dialect, path, setup, block_delete=block_delete, closed=closed)
+    options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
         result = run(motion.blocks, setup, picked, motion.name, record=wanted)
     warnings = [*setup.warnings, *motion.warnings()]
