@@ -31,6 +31,11 @@ def print_text(text: str) -> None:
     sys.stdout.write(text if text.endswith("\n") else text + "\n")
 
 
+def print_error(text: str) -> None:
+    """Print one line on stderr."""
+    sys.stderr.write(one_line(text) + "\n")
+
+
 def one_line(text: str) -> str:
     """Return `text` with every control character spelled out, so that it is one harmless line."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

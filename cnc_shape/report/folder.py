@@ -34,7 +34,7 @@ class Context:
     """What a run was made from; nothing in it may depend on the time or the place of the run."""
 
     command: Sequence[str]  # the command line, without paths of this machine's own
-    inputs: Mapping[str, bytes]  # name: content of every file that was read
+    inputs: Mapping[str, str]  # name: SHA-256 of every file that was read
     machine: str  # resolved machine file, YAML
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper])
     modes: Mapping[str, Sequence[Mode]] = field(default_factory=dict[str, Sequence[Mode]])
@@ -130,7 +130,7 @@ def _run_json(context: Context) -> str:
         "schema": "cnc-shape/run/1",
         "version": __version__,
         "command": list(context.command),
-        "inputs": {name: hashlib.sha256(data).hexdigest() for name, data in context.inputs.items()},
+        "inputs": dict(context.inputs),
         "machine_sha256": hashlib.sha256(context.machine.encode()).hexdigest(),
         "warnings": list(context.warnings),
     }
