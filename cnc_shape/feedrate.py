@@ -1,24 +1,43 @@
-"""Profile: the time law along a path."""
+"""Profile: the time law along a path, as fast as the axes and the feed allow.
+
+The scan backwards finds how fast each node may be passed at most if all that follows is to be kept, the
+scan forwards drives up to that (`kernels/time_law.py`). A chunk is planned as if the path rested at its
+end, the most cautious of all futures. Where the scan backwards nevertheless arrives at a cell's own limit,
+the past cannot depend on the future: up to there the law is final. So the look-ahead is a stopping
+distance, whatever the number of blocks.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
-from cnc_shape.arrays import FloatArray, IntArray
-from cnc_shape.smoothing import Path
+import numpy as np
+
+from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
+from cnc_shape.errors import InfeasibleError
+from cnc_shape.kernels.sampling import excesses
+from cnc_shape.kernels.time_law import backward, forward, speed_limits
+from cnc_shape.limits import Limits
+from cnc_shape.smoothing import Path, join_paths
+
+PATIENCE = 1024  # cells that gather before a new attempt, so that short chunks do not repeat the scan
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
     """A chunk of the time law u(t): pieces of constant path jerk, cut at cell borders.
 
-    In piece m, with ``e = t - time[m]``: ``u = u[m] + v e + a e^2/2 + j e^3/6`` until ``time[m] + duration[m]``.
+    In piece m, with ``e = t - time[m]``: ``s = u[m] + v e + a e^2/2 + j e^3/6`` until ``time[m + 1]``, where
+    s is the path parameter counted from the start of the piece's cell. The last piece of a program is
+    its rest at the end.
     """
 
     path: Path  # the cells that the pieces run through
     time: FloatArray  # (m,) s, start of the piece
     duration: FloatArray  # (m,) s
-    u: FloatArray  # (m,) path parameter at the piece's start
+    u: FloatArray  # (m,) path parameter at the piece's start, from the start of its cell
     velocity: FloatArray  # (m,) du/dt
     acceleration: FloatArray  # (m,)
     jerk: FloatArray  # (m,)
@@ -26,3 +45,175 @@ class Profile:
 
     def __len__(self) -> int:
         return self.time.size
+
+    @property
+    def end_time(self) -> float:
+        """Time at the end of the last piece, s: the cycle time, if the chunk is the last one."""
+        return float(self.time[-1] + self.duration[-1]) if len(self) else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """What a time law asks of the machine beyond its limits; 0 or less where the promise is kept."""
+
+    velocity: float  # -, largest relative excess over an axis's velocity
+    acceleration: float  # -, the same for acceleration
+    feed: float  # -, the same for the feed rate
+    gap: float  # mm or rad, largest jump of the path parameter between pieces
+    jump: float  # mm/s or rad/s, largest jump of the path speed between pieces
+    line: int | None  # source line of the largest excess
+
+    @property
+    def worst(self) -> float:
+        """Largest relative excess over any limit."""
+        return max(self.velocity, self.acceleration, self.feed)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PlanningState:
+    """Between two chunks: cells whose speed depends on what follows, and the motion at their start."""
+
+    parts: tuple[Path, ...]
+    clock: FloatArray  # (3,) s, its rounding error, squared speed at the first cell
+    before_v2: float  # squared speed limit of the cell before the first one
+    patience: int  # cells to gather before the next attempt
+
+
+PlanningStep: TypeAlias = Callable[[PlanningState | None, Path, bool], tuple[PlanningState | None, Profile]]
+
+
+def planning(limits: Sequence[Limits]) -> PlanningStep:
+    """Return the resumable step from Path to Profile: ``step(state, chunk, last) -> (state, profile)``.
+
+    Parameters
+    ----------
+    limits
+        One per axis of the path, in the order of `path.axes`. Jerk is not limited.
+    """
+    velocity = frozen([limit.velocity for limit in limits])
+    acceleration = frozen([limit.acceleration for limit in limits])
+
+    def step(state: PlanningState | None, path: Path, last: bool) -> tuple[PlanningState | None, Profile]:
+        _check(path, velocity, acceleration)
+        before = state or PlanningState((), frozen(np.zeros(3)), np.inf, PATIENCE)
+        parts = (*before.parts, path) if len(path) else before.parts
+        gathered = sum(len(part) for part in parts)
+        if gathered == 0 or (not last and gathered < before.patience):
+            waiting = None if last else PlanningState(parts, before.clock, before.before_v2, before.patience)
+            return waiting, _no_pieces(path.cut(slice(0, 0)))
+        whole = join_paths(parts)
+        limit_v2, straight = speed_limits(
+            whole.coefficients, whole.length, whole.feed_rate, rotary_only(whole), velocity, acceleration
+        )
+        reach_v2, free = backward(
+            whole.coefficients, whole.length, whole.stop, limit_v2, straight, acceleration, before.before_v2
+        )
+        final = len(whole) if last else int(np.flatnonzero(free[:-1])[-1]) if free[:-1].any() else 0
+        clock = before.clock.copy()
+        done = whole.cut(slice(0, final))
+        pieces, cell = forward(
+            done.coefficients,
+            done.length,
+            done.stop,
+            done.dwell,
+            limit_v2,
+            straight,
+            acceleration,
+            reach_v2,
+            clock,
+        )
+        if not np.isfinite(clock[0]):
+            stuck = int(cell[np.flatnonzero(~np.isfinite(pieces[:, 1]))[0]])
+            raise InfeasibleError(
+                "a single curved cell between two stops has no time law", line=int(done.line[stuck])
+            )
+        profile = _profile(done, pieces, cell)
+        if last:
+            return None, profile
+        rest = whole.cut(slice(final, None))
+        limit_before = float(limit_v2[final - 1]) if final else before.before_v2
+        return PlanningState((rest,), frozen(clock), limit_before, 2 * len(rest) + PATIENCE), profile
+
+    return step
+
+
+def plan(path: Path, limits: Sequence[Limits]) -> Profile:
+    """Plan the fastest motion along a whole path.
+
+    Every axis keeps its velocity and acceleration, ``|q'| du/dt`` in XYZ the feed rate (of the rotary axes
+    where they move alone).
+
+    Raises
+    ------
+    InfeasibleError
+        A move of an axis without velocity or acceleration, or without feed; names the line.
+    """
+    _, profile = planning(limits)(None, path, True)
+    return profile
+
+
+def rotary_only(path: Path) -> IntArray:
+    """Mark the cells in which rotary axes move alone, (k,)."""
+    return frozen_integers(path.stretch == 0.0)
+
+
+def worst_violation(profile: Profile, limits: Sequence[Limits], points: int = 9) -> Violation:
+    """Evaluate a time law densely against the limits it promises to keep, and its pieces for gaps.
+
+    Parameters
+    ----------
+    points
+        Points in each piece, both ends included. Acceleration is quadratic in the path parameter there.
+    """
+    path = profile.path
+    bounds = np.array([[limit.velocity for limit in limits], [limit.acceleration for limit in limits]])
+    worst, where = excesses(
+        profile.time, profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk,
+        profile.cell, path.coefficients, path.length, path.feed_rate, rotary_only(path), path.stop, bounds,
+        points,
+    )  # fmt: skip
+    most = int(np.argmax(worst[:3]))
+    line = int(path.line[profile.cell[where[most]]]) if len(profile) else None
+    return Violation(
+        float(worst[0]) - 1.0,
+        float(worst[1]) - 1.0,
+        float(worst[2]) - 1.0,
+        float(worst[3]),
+        float(worst[4]),
+        line,
+    )
+
+
+def _check(path: Path, velocity: FloatArray, acceleration: FloatArray) -> None:
+    if velocity.size != len(path.axes):
+        raise ValueError(f"{velocity.size} limits for the axes {path.axes}")
+    moves = path.length > 0.0
+    idle = moves & ~(path.feed_rate > 0.0)
+    if idle.any():
+        first = int(np.argmax(idle))
+        raise InfeasibleError(
+            f"a move with feed rate {path.feed_rate[first]:g}",
+            hint="give F before it",
+            line=int(path.line[first]),
+        )
+    for column, axis in enumerate(path.axes):
+        for name, limit in (("velocity", velocity[column]), ("acceleration", acceleration[column])):
+            if limit > 0.0:
+                continue
+            used: BoolArray = moves & (path.coefficients[:, 1:, column] != 0.0).any(axis=1)
+            if used.any():
+                raise InfeasibleError(
+                    f"{axis.upper()} moves, but its {name} limit is {limit:g}",
+                    hint=f"give the axis a {name} limit above 0",
+                    line=int(path.line[int(np.argmax(used))]),
+                )
+
+
+def _profile(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
+    time, duration, u, velocity, acceleration = (frozen(pieces[:, column]) for column in range(5))
+    jerk = frozen(np.zeros(time.size))
+    return Profile(path, time, duration, u, velocity, acceleration, jerk, frozen_integers(cell))
+
+
+def _no_pieces(path: Path) -> Profile:
+    return _profile(path, np.empty((0, 5)), np.empty(0, np.int64))

@@ -88,9 +88,9 @@ def moving(
         planned, profile = plan(planned, path, last)
         names = tuple(axis for axis, seen in zip(chunk.axes, moved, strict=True) if seen)
         pending: Toolpath | None = toolpath
-        for (sampled, command), end in with_last(draw(sampled, profile, last)):
-            yield Block(pending, command, last and end, sampled.cycle_time, names)
-            pending = None
+        for (drawn, command), end in with_last(draw(sampled, profile, last)):
+            yield Block(pending, command, last and end, drawn.end_time, names)
+            pending, sampled = None, drawn
 
 
 def replaying(command: Trajectory, toolpath: Toolpath) -> Iterator[Block]:

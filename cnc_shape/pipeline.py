@@ -16,7 +16,7 @@ numbers do not depend on where it was cut.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -24,16 +24,16 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup, Shaping
-from cnc_shape.contour import ContourError, MeasuringState, Tally, measuring, tally
+from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
-from cnc_shape.errors import OptionError
+from cnc_shape.errors import InfeasibleError, OptionError
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.machine import FirstOrderLag, Machine
 from cnc_shape.motion import Block
-from cnc_shape.recording import Recorder, Signals
+from cnc_shape.recording import Outline, Recorder, Signals
 from cnc_shape.shapers import Shaper
 from cnc_shape.shapers.shaping import ShapingState, delays, shaping
-from cnc_shape.simulation import Response, SimulationState, simulating
+from cnc_shape.simulation import SimulationState, simulating
 
 WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
 WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
@@ -149,7 +149,7 @@ class Trial:
     def __init__(self, case: Case, machine: Machine, recorder: Recorder | None = None) -> None:
         self.case = case
         self._machine = machine
-        self._recorder = recorder
+        self.recorder = recorder
         self._shape = shaping(case.shapers, case.control.sample_time)
         self._simulate = simulating(machine, case.control)
         axes = tuple(axis.name for axis in machine.axes)
@@ -164,7 +164,7 @@ class Trial:
         self._cycle_time = 0.0
 
     def _window(self, machine: Machine) -> tuple[int, int]:
-        """How many samples back and ahead of its own the place on the path may lie that a sample is measured at."""
+        """Samples back and ahead of its own within which a sample's place on the path is sought."""
         lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
         settling = 1.0 / self.case.control.position_gain if lags else 0.0
         rate = 1.0 / self.case.control.sample_time
@@ -186,10 +186,16 @@ class Trial:
             self._measured, block.toolpath, response.command.arc_length, signals, block.last
         )
         self._tallies = tuple(tally(state, error) for state, error in zip(self._tallies, errors, strict=True))  # pyright: ignore[reportAttributeAccessIssue]
-        if self._recorder is not None:
-            self._recorder.add(response, errors)
+        if self.recorder is not None:
+            self.recorder.add(response, errors)
         if block.last:
             self._cycle_time = block.cycle_time + self._longest
+
+    def signals(self) -> Signals | None:
+        """Samples kept for a report, if any were to be; call it after the last block."""
+        if self.recorder is None or self._simulated is None:
+            return None
+        return self.recorder.signals(self._simulated.settling)
 
     def summary(self) -> CaseSummary:
         """Scalars of the case; call it after the last block."""
@@ -205,14 +211,63 @@ class Trial:
         return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual)
 
 
-__all__ = [
-    "Case",
-    "CaseSummary",
-    "ContourError",
-    "Deviation",
-    "Iterable",
-    "Response",
-    "Run",
-    "Summary",
-    "Trial",
-]
+def run(
+    blocks: Iterable[Block],
+    setup: Setup,
+    cases: Sequence[Case],
+    program: str,
+    *,
+    record: bool = False,
+    progress: Callable[[Block], None] | None = None,
+) -> Run:
+    """Send a motion through every case and measure it.
+
+    Parameters
+    ----------
+    blocks
+        The unshaped motion, from `motion.moving` or `motion.replaying`.
+    setup
+        The machine.
+    cases
+        The rows of the table, in order.
+    program
+        Its name in the table.
+    record
+        Keep the signals for a report.
+    progress
+        Told of every block that is done.
+
+    Raises
+    ------
+    InfeasibleError
+        The program does not move, a loop is unstable, or what `blocks` raises.
+    """
+    trials: list[Trial] = []
+    outline = Outline()
+    samples, cycle_time, moved = 0, 0.0, ()
+    for block in blocks:
+        if not trials:
+            axes = block.command.axes
+            machine = setup.machine.with_axes(axes)
+            period = setup.control.sample_time
+            trials = [
+                Trial(case, machine, Recorder(case.name, axes, period) if record else None) for case in cases
+            ]
+        if record and block.toolpath is not None:
+            outline.add(block.toolpath)
+        for trial in trials:
+            trial.advance(block)
+        samples += len(block.command)
+        cycle_time, moved = block.cycle_time, block.moved
+        if progress is not None:
+            progress(block)
+    if not moved:
+        raise InfeasibleError(
+            "the program moves nothing", hint="it has no G1, G2 or G3 with travel", source=program
+        )
+    summary = Summary(
+        program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
+        tuple(trial.summary() for trial in trials),
+    )  # fmt: skip
+    signals = tuple(found for trial in trials if (found := trial.signals()) is not None)
+    return Run(summary, signals, outline.points(), moved)

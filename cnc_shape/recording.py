@@ -15,8 +15,12 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.contour import ContourError
+from cnc_shape.kernels.foot_point import points_at
+from cnc_shape.segments import segments
 from cnc_shape.simulation import Response
+from cnc_shape.toolpath import Toolpath
 
+OUTLINE_ANGLE = 0.05  # rad, of a chord that stands for an arc in a drawing
 KEPT = 2_000_000  # samples of a case that are kept as they are
 DECIMATED = 200_000  # samples that a longer motion is thinned to, at most
 
@@ -39,6 +43,8 @@ class Signals:
     tool_error: FloatArray  # (n,) mm
     foot: FloatArray  # (n,3) mm, the path's nearest point to the tool
     line: IntArray  # (n,) source line of the foot point of the tool
+    settling_time: FloatArray  # (m,) s, after the end of the motion
+    settling: FloatArray  # (m,d) mm or rad, tool minus drive then
 
     def __post_init__(self) -> None:
         if self.command.shape != (self.time.size, len(self.axes)):
@@ -78,8 +84,11 @@ class Recorder:
         self._append(np.column_stack([index, rows[:decided], errors[-1].foot, *distances, errors[-1].line]))
         self._count += decided
 
-    def signals(self) -> Signals:
-        """What was kept, as one value; call it after the last block."""
+    def signals(self, settling: FloatArray) -> Signals:
+        """What was kept, as one value; call it after the last block.
+
+        settling: (m,d) tool minus drive, every sample from the end of the motion on.
+        """
         d = len(self._axes)
         table = np.concatenate(self._table) if self._table else np.zeros((0, 5 * d + 8))
         width = self._width(self._count)
@@ -90,6 +99,7 @@ class Recorder:
         return Signals(
             self._case, self._axes, max(width // 2, 1), frozen(table[:, 0] * self._sample_time),
             *parts, *errors, frozen(table[:, 5 * d + 1 : 5 * d + 4]), frozen_integers(table[:, -1]),
+            frozen(np.arange(settling.shape[0]) * self._sample_time), frozen(settling),
         )  # fmt: skip
 
     def _width(self, count: int) -> int:
@@ -110,6 +120,40 @@ class Recorder:
         complete = int(np.searchsorted(whole[:, 0], after - after % width))
         whole = np.concatenate([_thin(whole[:complete], width), whole[complete:]])
         self._table, self._rows = [whole], whole.shape[0]
+
+
+class Outline:
+    """Collects the programmed path as a polyline to draw."""
+
+    def __init__(self) -> None:
+        self._points: list[FloatArray] = []
+
+    def add(self, toolpath: Toolpath) -> None:
+        """Take the next chunk of the path; arcs are chopped into chords."""
+        path = segments(toolpath, first=not self._points)
+        if path.low.size == 0:
+            return
+        chords = np.ones(path.low.size, dtype=np.int64)
+        turns = path.arc >= 0
+        chords[turns] = np.ceil(path.arcs[:, 15] / OUTLINE_ANGLE).astype(np.int64)
+        row = np.repeat(np.arange(chords.size), chords)
+        share = (np.arange(row.size) - np.repeat(np.cumsum(chords) - chords, chords) + 1) / chords[row]
+        place = path.low[row] + share * (path.high[row] - path.low[row])
+        points = points_at(
+            frozen(place),
+            frozen_integers(row),
+            path.start,
+            path.end,
+            path.low,
+            path.high,
+            path.arc,
+            path.arcs,
+        )
+        self._points.append(points if self._points else np.vstack([path.start[:1], points]))
+
+    def points(self) -> FloatArray:
+        """The polyline, (p,3) mm."""
+        return frozen(np.concatenate(self._points) if self._points else np.zeros((0, 3)))
 
 
 def _thin(table: FloatArray, width: int) -> FloatArray:

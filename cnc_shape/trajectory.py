@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
-from cnc_shape.arrays import FloatArray
+import numpy as np
+
+from cnc_shape.arrays import FloatArray, frozen, frozen_integers
+from cnc_shape.feedrate import Profile
+from cnc_shape.kernels.sampling import sample_pieces
+
+BLOCK = 65536  # samples in a chunk at most
+END_MARGIN = 1e-6  # -, of a sample: a motion that ends within it after a sample ends at it
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -23,3 +32,124 @@ class Trajectory:
 
     def __len__(self) -> int:
         return self.arc_length.size
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SamplingState:
+    """Between two chunks: the next sample, and the piece it may lie in."""
+
+    sample: int  # number of the next sample
+    held: Profile  # the last piece, which ends where the next chunk begins; or none
+    end_time: float  # s, end of the motion so far: the cycle time, after the last chunk
+
+
+SamplingStep: TypeAlias = Callable[
+    [SamplingState | None, Profile, bool], Iterator[tuple[SamplingState, Trajectory]]
+]
+
+
+def sampling(sample_time: float, block: int = BLOCK) -> SamplingStep:
+    """Return the resumable step from Profile to Trajectory.
+
+    A long piece spans many blocks, so the step is an iterator: ``for state, trajectory in step(state, chunk,
+    last)`` runs at least once, with at most `block` samples a time, maybe none. The state that came last
+    goes into the next call; after the last chunk it tells the cycle time. Which samples come together
+    depends on the chunks, the samples do not.
+
+    Parameters
+    ----------
+    sample_time
+        Period, s.
+    block
+        Most samples in one yield.
+    """
+
+    def step(
+        state: SamplingState | None, profile: Profile, last: bool
+    ) -> Iterator[tuple[SamplingState, Trajectory]]:
+        now = state or SamplingState(0, _pieces(profile, 0, 0), 0.0)
+        if len(profile):
+            for trajectory in _blocks(now.held, float(profile.time[0]), now.sample, sample_time, block):
+                now = SamplingState(now.sample + len(trajectory), now.held, now.end_time)
+                yield now, trajectory
+            moving = _pieces(profile, 0, len(profile) - 1)
+            held = _pieces(profile, len(profile) - 1, len(profile))
+            now = SamplingState(now.sample, held, profile.end_time)
+            for trajectory in _blocks(moving, float(profile.time[-1]), now.sample, sample_time, block):
+                now = SamplingState(now.sample + len(trajectory), held, now.end_time)
+                yield now, trajectory
+        if last and len(now.held):
+            until = now.end_time - END_MARGIN * sample_time
+            for trajectory in _blocks(now.held, until, now.sample, sample_time, block):
+                now = SamplingState(now.sample + len(trajectory), now.held, now.end_time)
+                yield now, trajectory
+            yield (
+                SamplingState(now.sample + 1, _pieces(now.held, 0, 0), now.end_time),
+                _rest(now.held, sample_time),
+            )
+        else:
+            yield now, next(iter(_blocks(_pieces(profile, 0, 0), 0.0, 0, sample_time, 1)))
+
+    return step
+
+
+def sample(profile: Profile, sample_time: float) -> Trajectory:
+    """Sample a whole profile at a period of `sample_time` s."""
+    blocks = [trajectory for _, trajectory in sampling(sample_time)(None, profile, True)]
+    return Trajectory(
+        profile.path.axes,
+        sample_time,
+        frozen(np.concatenate([block.arc_length for block in blocks])),
+        frozen(np.concatenate([block.position for block in blocks])),
+        frozen(np.concatenate([block.velocity for block in blocks])),
+        frozen(np.concatenate([block.acceleration for block in blocks])),
+    )
+
+
+def _pieces(profile: Profile, begin: int, end: int) -> Profile:
+    """Return a view of some pieces; of just one, with its cell alone, so that no chunk is kept alive for it."""
+    path, cell = profile.path, profile.cell[begin:end]
+    if end - begin == 1:
+        k = int(cell[0])
+        path, cell = path.cut(slice(k, k + 1)), frozen_integers(np.zeros(1))
+    columns = (
+        profile.time,
+        profile.duration,
+        profile.u,
+        profile.velocity,
+        profile.acceleration,
+        profile.jerk,
+    )
+    return Profile(path, *(column[begin:end] for column in columns), cell)
+
+
+def _blocks(
+    profile: Profile, until: float, first: int, sample_time: float, block: int
+) -> Iterator[Trajectory]:
+    """Samples from number `first` on that lie in the pieces and before `until` s, block by block; at least one."""
+    path = profile.path
+    piece = 0
+    while True:
+        left = max(0.0, until / sample_time - first) + 2.0
+        place, position, velocity, acceleration, piece = sample_pieces(
+            profile.time, profile.u, profile.velocity, profile.acceleration, profile.jerk, profile.cell,
+            path.coefficients, path.arc_length, path.stretch, until, piece, first, sample_time,
+            int(min(block, left)),
+        )  # fmt: skip
+        first += place.size
+        yield Trajectory(
+            path.axes, sample_time, frozen(place), frozen(position), frozen(velocity), frozen(acceleration)
+        )
+        if piece >= len(profile):
+            return
+
+
+def _rest(held: Profile, sample_time: float) -> Trajectory:
+    """Return the one sample at the end of a motion, at rest."""
+    path = held.path
+    e = path.length[-1:]
+    powers = np.stack([np.ones(1), e, e**2, e**3], axis=1)
+    position = (powers[:, :, None] * path.coefficients[-1:]).sum(axis=1)
+    still = frozen(np.zeros_like(position))
+    place = path.arc_length[-1:] + path.stretch[-1:] * e
+    return Trajectory(path.axes, sample_time, frozen(place), frozen(position), still, still)

@@ -74,3 +74,67 @@ def contour_distance(point, toolpath, lower=-np.inf, upper=np.inf, count=2001, r
             middle, width = shares[distance.argmin()], 2.0 * (shares[1] - shares[0])
             shares = np.linspace(max(low, middle - width), min(high, middle + width), count)
     return best
+
+
+# --- servo loop -----------------------------------------------------------------------------------
+
+
+def servo_loop(command, axes, loop):
+    """The loop with lag drives as matrices over lists: one expm a sample period and axis, terms as formulas."""
+    from scipy.linalg import expm
+
+    T, n = loop.sample_time, len(command)
+    systems = []
+    for axis in axes:
+        tau, gain = axis.drive.time_constant, axis.drive.gain
+        size = 2 + 2 * len(axis.modes)
+        M = np.zeros((size + 1, size + 1))
+        M[0, 1], M[1, 1], M[1, size] = 1, -1 / tau, gain / tau
+        for k, mode in enumerate(axis.modes):
+            w = 2 * np.pi * mode.natural_frequency
+            M[2 + 2 * k, 3 + 2 * k] = 1
+            M[3 + 2 * k, 2 + 2 * k], M[3 + 2 * k, 3 + 2 * k] = -w * w, -2 * mode.damping_ratio * w
+            M[3 + 2 * k] -= mode.participation * M[1]
+        systems.append(expm(M * T))
+    states = [np.zeros(2 + 2 * len(axis.modes)) for axis in axes]
+    for state, start in zip(states, command.position[0], strict=True):
+        state[0] = start
+    queue = [np.zeros(len(axes)) for _ in range(loop.delay_samples)]
+    tangent, position, tool = np.zeros(3), [], []
+    for k in range(n):
+        q = np.array([state[0] for state in states])
+        position.append(q)
+        tool.append([state[0] + state[2::2].sum() for state in states])
+        after = min(k + 1, n - 1)
+        next_velocity = command.velocity[k + 1] if k + 1 < n else 0 * command.velocity[k]
+        error = command.position[k] - q
+        speed = np.linalg.norm(command.velocity[k, :3])
+        if speed > 0:
+            tangent = command.velocity[k, :3] / speed
+        u = loop.position_gain * error
+        if loop.feedforward:
+            mean_v = (command.position[after] - command.position[k]) / T
+            mean_a = (next_velocity - command.velocity[k]) / T
+            for i, axis in enumerate(axes):
+                u[i] += (
+                    loop.feedforward.velocity * mean_v[i]
+                    + loop.feedforward.acceleration * axis.drive.time_constant * mean_a[i]
+                ) / axis.drive.gain
+        if loop.cross_coupling:
+            u[:3] += loop.cross_coupling.proportional * (error[:3] - (error[:3] @ tangent) * tangent)
+        queue.append(u)
+        now = queue.pop(0)
+        states = [(S @ np.append(x, w))[:-1] for S, x, w in zip(systems, states, now, strict=True)]
+    return np.array(position), np.array(tool)
+
+
+def delayed_sum(time, sample_time, position, velocity, shaper, delay):
+    """A shaped position at `time`, s: the sum of scipy's Hermite cubics through the samples, each delayed."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    curve = CubicHermiteSpline(np.arange(position.size) * sample_time, position, velocity)
+    end = (position.size - 1) * sample_time
+    return sum(
+        a * curve(np.clip(time - t - delay, 0, end))
+        for t, a in zip(shaper.times, shaper.amplitudes, strict=True)
+    )

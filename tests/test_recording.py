@@ -23,9 +23,11 @@ def record(errors, chunk: int, kept: int) -> Signals:
         rows = slice(low, min(low + chunk, n))
         block = frozen(ramp[rows])
         command = Trajectory(("x", "y", "z"), SAMPLE_TIME, frozen(ramp[rows, 0]), block, block, block)
-        error = ContourError(frozen(errors[rows]), block, frozen(ramp[rows, 0]), frozen_integers(np.arange(n)[rows]))
+        error = ContourError(
+            frozen(errors[rows]), block, frozen(ramp[rows, 0]), frozen_integers(np.arange(n)[rows])
+        )
         recorder.add(Response(command, block, block, block, block), (error, error, error))
-    return recorder.signals()
+    return recorder.signals(np.ones((3, 3)))
 
 
 def test_a_short_motion_is_kept_whole():

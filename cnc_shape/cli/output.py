@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 
 def print_json(command: str | None, result: Mapping[str, object]) -> None:
@@ -29,6 +29,18 @@ def print_json(command: str | None, result: Mapping[str, object]) -> None:
 def print_text(text: str) -> None:
     """Print `text` and end the line."""
     sys.stdout.write(text if text.endswith("\n") else text + "\n")
+
+
+def print_error(text: str) -> None:
+    """Print one line on stderr."""
+    sys.stderr.write(one_line(text) + "\n")
+
+
+def warn(warnings: Iterable[str], *, quiet: bool) -> None:
+    """Print warnings on stderr, one line each."""
+    if not quiet:
+        for warning in warnings:
+            print_error(warning)
 
 
 def one_line(text: str) -> str:

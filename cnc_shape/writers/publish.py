@@ -68,7 +68,7 @@ def publishing(path: Path | str, *, force: bool = False) -> Generator[BinaryIO]:
         As `publish`; also raised by ``file.write``, so that other errors of the block stay what they are.
     """
     target = Path(path)
-    _check_file(target, force=force)
+    check_target(target, force=force)
     temporary = _beside(target)
     try:
         sink = _Sink(temporary, target)
@@ -80,7 +80,7 @@ def publishing(path: Path | str, *, force: bool = False) -> Generator[BinaryIO]:
             file.flush()
             with _faults_of(target):
                 os.fsync(sink.fileno())
-        _check_file(target, force=force)
+        check_target(target, force=force)
         with _faults_of(target):
             os.rename(temporary, target)
     except BaseException:
@@ -117,7 +117,7 @@ def publish_folder(
         The folder exists and may not be replaced, its parent is missing or read-only, or the disk refuses.
     """
     target = Path(target)
-    _check_folder(target, marker, force=force)
+    check_folder(target, marker, force=force)
     temporary = _beside(target)
     with _faults_of(target):
         temporary.mkdir()
@@ -130,7 +130,7 @@ def publish_folder(
                 for name in names:
                     _sync(Path(folder, name))
                 _sync(Path(folder))
-        _check_folder(target, marker, force=force)
+        check_folder(target, marker, force=force)
         with _faults_of(target):
             _swap(temporary, target)
     except BaseException:
@@ -138,6 +138,23 @@ def publish_folder(
         raise
     with _faults_of(target):
         _sync(target.parent)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder for results, unless it is there.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made, or is something else.
+    """
+    mode = _mode(path)
+    if mode is not None and stat.S_ISDIR(mode):
+        return
+    if mode is not None:
+        raise OutputError(f"{path} is not a folder", hint="move it, or name another folder")
+    with _faults_of(path):
+        path.mkdir(exist_ok=True)
 
 
 def _swap(temporary: Path, target: Path) -> None:
@@ -182,7 +199,8 @@ def _beside(target: Path) -> Path:
     return target.parent / f".cnc-shape-{secrets.token_hex(8)}.tmp"
 
 
-def _check_file(target: Path, *, force: bool) -> None:
+def check_target(target: Path, *, force: bool) -> None:
+    """Refuse a file that `publish` would refuse, before the work is done."""
     _check_parent(target)
     mode = _mode(target)
     if mode is None:
@@ -197,7 +215,8 @@ def _check_file(target: Path, *, force: bool) -> None:
         raise OutputError(f"{target} exists", hint="use --force to replace it, or name another file")
 
 
-def _check_folder(target: Path, marker: str, *, force: bool) -> None:
+def check_folder(target: Path, marker: str, *, force: bool) -> None:
+    """Refuse a folder that `publish_folder` would refuse, before the work is done."""
     _check_parent(target)
     mode = _mode(target)
     if mode is None:
