@@ -55,7 +55,7 @@ def read_block(pairs: list[tuple[str, str]], dialect: Dialect) -> Block:
         elif letter == "M":
             _add_m(value, number, m, dialect)
         elif letter == "N":
-            if place:
+            if place or value < 0.0:
                 raise BlockError("N stands at the beginning of a line only", hint="move it there", letter="N")
         elif letter in words:
             raise BlockError(f"two {letter} words on one line", hint="keep one of them", letter=letter)
@@ -92,14 +92,8 @@ def _add_g(value: float, number: str, g: dict[str, int], dialect: Dialect) -> No
         reason, hint = REFUSED[code]
         raise BlockError(reason, hint=hint, letter=name_of(code))
     if group is None or (code in NOT_YET and dialect is not Dialect.MARLIN):
-        reason, hint = NOT_YET[code]
-        raise BlockError(
-            f"{name_of(code)}: {reason} are not built yet"
-            if reason.endswith("s")
-            else f"{name_of(code)}: {reason} is not built yet",
-            hint=hint,
-            letter=name_of(code),
-        )
+        what, hint = NOT_YET[code]
+        raise BlockError(f"{name_of(code)} ({what}) is not built yet", hint=hint, letter=name_of(code))
     if group in g:
         other = name_of(g[group])
         raise BlockError(
@@ -118,8 +112,8 @@ def _add_m(value: float, number: str, m: list[int], dialect: Dialect) -> None:
             f"unknown code M{number}", hint="see the list of codes that are read", letter=f"M{number}"
         )
     if code in M_NOT_YET:
-        reason, hint = M_NOT_YET[code]
-        raise BlockError(f"M{code}: {reason} is not built yet", hint=hint, letter=f"M{code}")
+        what, hint = M_NOT_YET[code]
+        raise BlockError(f"M{code} ({what}) is not built yet", hint=hint, letter=f"M{code}")
     group = M_GROUP_OF.get(code)
     for other in m:
         if other == code or (group is not None and M_GROUP_OF.get(other) == group):

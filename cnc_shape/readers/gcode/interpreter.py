@@ -144,10 +144,10 @@ class Interpreter:
         if non_modal == codes.DWELL:
             pause = pause if printer_dwell else dwell(block, self.dialect)
             self.rows.rows.append(row_of(Motion.DWELL, self.line, modal, dwell=pause))
-        if non_modal == codes.SET_POSITION and self.dialect is Dialect.MARLIN and not set(AXES) & set(words):
-            g = block.g
-            del g[codes.NON_MODAL]  # G92 E0 counts filament
-            words.pop("E", None)
+        if non_modal == codes.SET_POSITION and self.dialect is Dialect.MARLIN:
+            words.pop("E", None)  # counts filament
+            if not set(AXES) & set(words):
+                del g[codes.NON_MODAL]
         if non_modal == codes.SMOOTHNESS:
             words.pop("P", None)
             words.pop("E", None)
