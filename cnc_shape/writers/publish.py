@@ -140,6 +140,23 @@ def publish_folder(
         _sync(target.parent)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder for results, unless it is there.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made, or is something else.
+    """
+    mode = _mode(path)
+    if mode is not None and stat.S_ISDIR(mode):
+        return
+    if mode is not None:
+        raise OutputError(f"{path} is not a folder", hint="move it, or name another folder")
+    with _faults_of(path):
+        path.mkdir(exist_ok=True)
+
+
 def _swap(temporary: Path, target: Path) -> None:
     """Rename `temporary` to `target`; what was there stands aside, and comes back after a fault."""
     if not os.path.lexists(target):
