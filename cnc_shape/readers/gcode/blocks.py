@@ -14,6 +14,7 @@ from cnc_shape.readers.gcode.codes import (
     PROGRAM_ENDS,
     REFUSED,
     SET_TOOL,
+    SMOOTHNESS,
     name_of,
 )
 from cnc_shape.readers.gcode.dialects import Dialect
@@ -69,7 +70,12 @@ def read_block(pairs: list[tuple[str, str]], dialect: Dialect) -> Block:
             words["O"] = value
         else:
             words[letter] = value
-    if "E" in words and dialect is not Dialect.MARLIN and not {66, 67, 68} & set(m):
+    if (
+        "E" in words
+        and dialect is not Dialect.MARLIN
+        and not {66, 67, 68} & set(m)
+        and SMOOTHNESS not in g.values()
+    ):
         raise BlockError(
             "an E word: only 3D printers have it",
             hint="exponents are not numbers of G-code; for a printer's program use --dialect marlin",
@@ -83,7 +89,7 @@ def _add_g(value: float, number: str, g: dict[str, int], dialect: Dialect) -> No
     group = GROUP_OF.get(code)
     if abs(value * 10.0 - code) > 1e-6 or (
         (group is None and code not in NOT_YET and code not in REFUSED)
-        or (code == 1870 and dialect is not Dialect.FANUC)
+        or (code == SMOOTHNESS and dialect is not Dialect.FANUC)
     ):
         raise BlockError(
             f"unknown code G{number}", hint="see the list of codes that are read", letter=f"G{number}"

@@ -72,6 +72,8 @@ class Interpreter:
 
     def execute(self, line: str) -> None:
         """Carry out one line in the readable way."""
+        if self.dialect is Dialect.MARLIN and printer.is_ignored(line, self.remark):
+            return
         text = compact(line)
         if text.startswith("%"):
             self._percent(text)
@@ -87,7 +89,7 @@ class Interpreter:
             text = text.translate({ord(char): None for char in "!~?"})
         elif self.dialect is Dialect.MARLIN:
             text = printer.without_checksum(text)
-            if printer.is_ignored(text, line, self.remark) or self._printer_moves(text):
+            if self._printer_moves(text):
                 return
         if not text:
             return
