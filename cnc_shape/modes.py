@@ -25,6 +25,7 @@ class Mode:
     natural_frequency: float  # Hz, undamped
     damping_ratio: float  # -, 0 <= zeta < 1
     participation: float = 1.0  # -, share of the drive's acceleration that excites the mode
+    frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative to it
 
     def __post_init__(self) -> None:
         if not (isfinite(self.natural_frequency) and self.natural_frequency > 0.0):
@@ -39,6 +40,11 @@ class Mode:
             )
         if not isfinite(self.participation):
             raise OptionError(f"a mode's participation must be finite, not {self.participation}")
+        if not 0.0 <= self.frequency_uncertainty < 1.0:
+            raise OptionError(
+                f"a frequency uncertainty must be at least 0 and below 1, not {self.frequency_uncertainty}",
+                hint="0.03 means 3 per cent up or down",
+            )
 
     @property
     def omega(self) -> float:

@@ -1,14 +1,52 @@
 """The whole story: a program, a machine, and what the machine makes of the program.
 
 Program -> Toolpath -> Path -> Profile -> Trajectory; then for each case: shaped -> simulated -> measured.
+
+::
+
+    motion.py      reads, smooths, plans and samples: once
+       |  Block: toolpath + command
+       +--> Trial "unshaped":  simulate -> measure -> CaseSummary
+       +--> Trial "shaped":    shape -> simulate -> measure -> CaseSummary
+       +--> ...
+
+Every stage is a fold over chunks, so a program of any length runs in the memory of one chunk, and the
+numbers do not depend on where it was cut.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil, sqrt
 
-from cnc_shape.arrays import FloatArray, IntArray
+import numpy as np
+
+from cnc_shape.arrays import FloatArray
+from cnc_shape.config.setup import Setup, Shaping
+from cnc_shape.contour import MeasuringState, Tally, measuring, tally
+from cnc_shape.controllers import Control
+from cnc_shape.errors import InfeasibleError, OptionError
+from cnc_shape.kernels.sums import add_squares
+from cnc_shape.machine import FirstOrderLag, Machine
+from cnc_shape.motion import Block
+from cnc_shape.recording import Outline, Recorder, Signals
+from cnc_shape.shapers import Shaper
+from cnc_shape.shapers.shaping import ShapingState, delays, shaping
+from cnc_shape.simulation import SimulationState, simulating
+
+WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
+WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
+WINDOW_AHEAD = 1.5  # of the position loop's time constant 1/Kp
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One row of the table: which shapers and which loop the motion goes through."""
+
+    name: str
+    shapers: Mapping[str, Shaper]
+    control: Control
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,37 +83,191 @@ class Summary:
     cases: tuple[CaseSummary, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Signals:
-    """The samples of one case that were kept for the report; decimated by `factor` beyond its limit."""
-
-    case: str
-    axes: tuple[str, ...]
-    factor: int  # 1: every sample
-    time: FloatArray  # (n,) s
-    command: FloatArray  # (n,d) mm or rad
-    position: FloatArray  # (n,d) mm or rad, of the drives
-    tool: FloatArray  # (n,d) mm or rad
-    velocity: FloatArray  # (n,d) mm/s, of the command
-    acceleration: FloatArray  # (n,d) mm/s^2, of the command
-    command_error: FloatArray  # (n,) mm, contour error of the command
-    drive_error: FloatArray  # (n,) mm
-    tool_error: FloatArray  # (n,) mm
-    line: IntArray  # (n,) source line of the foot point of the tool
-
-    def __post_init__(self) -> None:
-        if self.command.shape != (self.time.size, len(self.axes)):
-            raise ValueError(f"{self.command.shape=}")
-
-
 @dataclass(frozen=True, slots=True)
 class Run:
     """A summary with the signals it was made from, and the programmed path as a polyline to draw."""
 
     summary: Summary
-    signals: tuple[Signals, ...]  # one a case, in the summary's order
+    signals: tuple[Signals, ...]  # one a case, in the summary's order; empty where none were recorded
     path: FloatArray  # (p,3) mm, the programmed path, arcs chopped for drawing
+    moved: tuple[str, ...] = ()  # axes that the program moves
 
     def signal(self, case: str) -> Signals:
         """Return the signals of the case called `case`."""
         return next(signals for signals in self.signals if signals.case == case)
+
+
+def default_cases(setup: Setup) -> tuple[Case, ...]:
+    """Rows of a machine's table: unshaped, shaped, then one row more per configured term."""
+    alone = Control(
+        sample_time=setup.control.sample_time,
+        position_gain=setup.control.position_gain,
+        delay_samples=setup.control.delay_samples,
+        feedforward=setup.control.feedforward,
+    )
+    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
+    if not shapers:
+        cases = [Case("independent", {}, alone)]
+        last = "cross_coupled"
+    else:
+        cases = [Case("unshaped", {}, alone), Case("shaped", shapers, alone)]
+        last = "shaped+cross_coupled"
+    if setup.control.cross_coupling is not None:
+        cases.append(Case(last, shapers, setup.control))
+    return tuple(cases)
+
+
+def pick_cases(setup: Setup, names: Sequence[str]) -> tuple[Case, ...]:
+    """Rows that the user names, in his order.
+
+    Raises
+    ------
+    OptionError
+        A name that this machine has no case for.
+    """
+    known = {case.name: case for case in default_cases(setup)}
+    if setup.shapers:
+        shaped = next((case for case in known.values() if case.shapers), None)
+        plain = shaped.control if shaped else next(iter(known.values())).control
+        known["axis_shaped"] = Case("axis_shaped", setup.shapers, plain)
+        known["shaped-feedforward"] = Case(
+            "shaped-feedforward",
+            setup.shapers,
+            Control(plain.sample_time, plain.position_gain, plain.delay_samples),
+        )
+    for name in names:
+        if name in ("contour_shaped", "path_shaped"):
+            raise OptionError(f"the case {name} is not built yet", hint="axis_shaped is")
+        if name not in known:
+            raise OptionError(f"this machine has no case called {name!r}", hint="it has " + ", ".join(known))
+    return tuple(known[name] for name in names)
+
+
+class Trial:
+    """One case under way: its stages, where they stand, and what they have seen so far."""
+
+    def __init__(self, case: Case, machine: Machine, recorder: Recorder | None = None) -> None:
+        self.case = case
+        self._machine = machine
+        self.recorder = recorder
+        self._shape = shaping(case.shapers, case.control.sample_time)
+        self._simulate = simulating(machine, case.control)
+        axes = tuple(axis.name for axis in machine.axes)
+        self._longest = delays(case.shapers, axes, case.control.sample_time).longest
+        self._measure = measuring(*self._window(machine), WINDOW_MARGIN)
+        self._shaped: ShapingState | None = None
+        self._simulated: SimulationState | None = None
+        self._measured: MeasuringState | None = None
+        self._tallies = (Tally(), Tally(), Tally())
+        self._following = np.zeros(len(axes))
+        self._samples = 0
+        self._cycle_time = 0.0
+
+    def _window(self, machine: Machine) -> tuple[int, int]:
+        """Samples back and ahead of its own within which a sample's place on the path is sought."""
+        lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
+        settling = 1.0 / self.case.control.position_gain if lags else 0.0
+        rate = 1.0 / self.case.control.sample_time
+        return (
+            ceil((WINDOW_BACK * settling + self._longest) * rate) + 1,
+            ceil((WINDOW_AHEAD * settling + self._longest) * rate) + 1,
+        )
+
+    def advance(self, block: Block) -> None:
+        """Run the next block through the case."""
+        command = block.command
+        if self.case.shapers:
+            self._shaped, command = self._shape(self._shaped, command, block.last)
+        self._simulated, response = self._simulate(self._simulated, command, block.last)
+        add_squares(response.following_error, self._following)
+        self._samples += len(response.command)
+        signals = (response.command.position, response.position, response.tool)
+        self._measured, errors = self._measure(
+            self._measured, block.toolpath, response.command.arc_length, signals, block.last
+        )
+        self._tallies = tuple(tally(state, error) for state, error in zip(self._tallies, errors, strict=True))  # pyright: ignore[reportAttributeAccessIssue]
+        if self.recorder is not None:
+            self.recorder.add(response, errors)
+        if block.last:
+            self._cycle_time = block.cycle_time + self._longest
+
+    def signals(self) -> Signals | None:
+        """Samples kept for a report, if any were to be; call it after the last block."""
+        if self.recorder is None or self._simulated is None:
+            return None
+        return self.recorder.signals(self._simulated.settling)
+
+    def summary(self) -> CaseSummary:
+        """Scalars of the case; call it after the last block."""
+        if self._simulated is None:
+            raise ValueError("a case without a single block has no summary")
+        axes = [axis.name for axis in self._machine.axes]
+        command, drives, tool = (Deviation(t.rms, t.max, t.line) for t in self._tallies)
+        following = {
+            axis: sqrt(total / self._samples)
+            for axis, total in zip(axes, self._following.tolist(), strict=True)
+        }
+        residual = dict(zip(axes, self._simulated.residual.tolist(), strict=True))
+        return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual)
+
+
+def run(
+    blocks: Iterable[Block],
+    setup: Setup,
+    cases: Sequence[Case],
+    program: str,
+    *,
+    record: bool = False,
+    progress: Callable[[Block], None] | None = None,
+) -> Run:
+    """Send a motion through every case and measure it.
+
+    Parameters
+    ----------
+    blocks
+        The unshaped motion, from `motion.moving` or `motion.replaying`.
+    setup
+        The machine.
+    cases
+        The rows of the table, in order.
+    program
+        Its name in the table.
+    record
+        Keep the signals for a report.
+    progress
+        Told of every block that is done.
+
+    Raises
+    ------
+    InfeasibleError
+        The program does not move, a loop is unstable, or what `blocks` raises.
+    """
+    trials: list[Trial] = []
+    outline = Outline()
+    samples, cycle_time, moved = 0, 0.0, ()
+    for block in blocks:
+        if not trials:
+            axes = block.command.axes
+            machine = setup.machine.with_axes(axes)
+            period = setup.control.sample_time
+            trials = [
+                Trial(case, machine, Recorder(case.name, axes, period) if record else None) for case in cases
+            ]
+        if record and block.toolpath is not None:
+            outline.add(block.toolpath)
+        for trial in trials:
+            trial.advance(block)
+        samples += len(block.command)
+        cycle_time, moved = block.cycle_time, block.moved
+        if progress is not None:
+            progress(block)
+    if not moved:
+        raise InfeasibleError(
+            "the program moves nothing", hint="it has no G1, G2 or G3 with travel", source=program
+        )
+    summary = Summary(
+        program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
+        tuple(trial.summary() for trial in trials),
+    )  # fmt: skip
+    signals = tuple(found for trial in trials if (found := trial.signals()) is not None)
+    return Run(summary, signals, outline.points(), moved)

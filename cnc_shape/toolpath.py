@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.program import Motion, Program
+from cnc_shape.program import ROTARY, Motion, Program
+from cnc_shape.units import DEGREE
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,15 +41,31 @@ class Toolpath:
         return self.kind.size
 
 
+def _starts(program: Program) -> FloatArray:
+    return np.vstack([program.start, program.target[:-1]]) if len(program) else program.target
+
+
+def _norm(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
+    return np.sqrt(x * x + y * y + z * z)  # term by term: the same bits however many rows stand together
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.column_stack([a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)])
+
+
 def travel_lengths(program: Program) -> FloatArray:
     """XYZ length of every programmed move, (m,) mm: chords, arcs, helices and spirals.
 
     The radius of an arc whose ends differ goes linearly with the angle from start to end; its length
     is the integral of ``sqrt(r^2 + (dr/dphi)^2 + (dz/dphi)^2)`` over the sweep.
     """
-    start = np.vstack([program.start, program.target[:-1]]) if len(program) else program.target
+    start = _starts(program)
     chord = program.target[:, :3] - start[:, :3]
-    length = np.sqrt((chord * chord).sum(axis=1))
+    length = _norm(chord[:, 0], chord[:, 1], chord[:, 2])
     arcs = np.flatnonzero(program.motion == Motion.ARC)
     if arcs.size:
         length[arcs] = _arc_lengths(
@@ -59,25 +78,36 @@ def travel_lengths(program: Program) -> FloatArray:
     return length
 
 
+def rotary_travel(program: Program) -> FloatArray:
+    """Travel of the rotary axes of every programmed move, (m,) rad: the root of the sum of squares."""
+    squares = np.zeros(len(program))
+    if len(program):
+        for column in range(3, len(program.axes)):
+            change = np.diff(program.target[:, column], prepend=program.start[column])
+            squares = squares + change * change
+    return np.sqrt(squares)
+
+
 def _arc_lengths(
     start: FloatArray, end: FloatArray, center: FloatArray, normal: FloatArray, sweep: FloatArray
 ) -> FloatArray:
-    """Closed form of the spiral's length; the circle and the helix are its limits."""
-    from_center = start - center
-    rise = ((end - start) * normal).sum(axis=1)
-    to_end = end - center
-    radial_start = np.sqrt((from_center * from_center).sum(axis=1))
-    in_plane = to_end - rise[:, None] * normal
-    radial_end = np.sqrt((in_plane * in_plane).sum(axis=1))
+    """Length of the spiral helix; the circle and the helix are its limits.
+
+    The mean of the integrand over the sweep is taken over the radius by Gauss-Legendre quadrature: exact
+    to rounding as long as the radius keeps away from zero.
+    """
+    arm = start - center
+    rise = _dot(end - start, normal)
+    last = end - center - rise[:, None] * normal
+    radius, last_radius = _norm(arm[:, 0], arm[:, 1], arm[:, 2]), _norm(last[:, 0], last[:, 1], last[:, 2])
     angle = np.abs(sweep)
-    slope = (radial_end - radial_start) / angle  # dr/dphi
-    # sqrt(r^2 + w^2) with w^2 = slope^2 + (dz/dphi)^2, r linear in phi: mean over r by Gauss-Legendre,
-    # exact to rounding because r changes by 0.1 % at most
-    w_v2 = slope**2 + (rise / angle) ** 2
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    middle, half = 0.5 * (radial_start + radial_end), 0.5 * (radial_end - radial_start)
-    radius = middle[:, None] + half[:, None] * nodes
-    return angle * (np.sqrt(radius**2 + w_v2[:, None]) @ weights) / 2.0
+    slope = (last_radius - radius) / angle  # dr/dphi
+    w_v2 = slope * slope + (rise / angle) ** 2
+    mean = np.zeros_like(radius)  # of sqrt(r^2 + w^2) over the sweep
+    for node, weight in zip(*np.polynomial.legendre.leggauss(16), strict=True):
+        at = 0.5 * (radius + last_radius) + 0.5 * (last_radius - radius) * node
+        mean += 0.5 * weight * np.sqrt(at * at + w_v2)
+    return angle * mean
 
 
 def build_toolpath(program: Program, arc_length: float = 0.0) -> Toolpath:
@@ -91,8 +121,8 @@ def build_toolpath(program: Program, arc_length: float = 0.0) -> Toolpath:
         XYZ travel before this chunk, mm.
     """
     length = travel_lengths(program)
-    start = np.vstack([program.start, program.target[:-1]]) if len(program) else program.target
-    moves = (length > 0.0) | (np.abs(program.target - start).max(axis=1, initial=0.0) > 0.0)
+    start = _starts(program)
+    moves = (length > 0.0) | (rotary_travel(program) > 0.0)
     keep = np.flatnonzero(moves | (program.motion == Motion.DWELL))
     return Toolpath(
         source=program.source,
@@ -113,27 +143,80 @@ def build_toolpath(program: Program, arc_length: float = 0.0) -> Toolpath:
     )
 
 
+ToolpathStep: TypeAlias = Callable[[float | None, Program, bool], tuple[float, Toolpath]]
+
+
+def building() -> ToolpathStep:
+    """Return the stage Program -> Toolpath as a fold: ``step(state, program, last) -> (state, toolpath)``.
+
+    The state is the arc length so far, mm; None starts. It is summed move by move, so that chunks of any
+    size give the same bits.
+    """
+
+    def step(state: float | None, program: Program, last: bool) -> tuple[float, Toolpath]:
+        del last  # nothing is held back
+        toolpath = build_toolpath(program, 0.0 if state is None else state)
+        return float(toolpath.arc_length[-1]), toolpath
+
+    return step
+
+
 def extent(program: Program) -> tuple[FloatArray, FloatArray]:
-    """True extent of every move, arcs included: lowest and highest coordinates, (m,d) each."""
-    start = np.vstack([program.start, program.target[:-1]]) if len(program) else program.target
-    low, high = np.minimum(start, program.target), np.maximum(start, program.target)
-    for row in np.flatnonzero(program.motion == Motion.ARC):
-        center, normal, sweep = program.center[row], program.normal[row], program.sweep[row]
-        arm = start[row, :3] - center
-        side = np.cross(normal, arm)
-        for axis in range(3):
-            # the coordinate's extremes lie where its derivative along the circle is zero
-            first = np.arctan2(side[axis], arm[axis])
-            for angle in first + np.pi * np.arange(-8, 9):
-                turn = angle if sweep >= 0.0 else angle
-                if 0.0 < turn / sweep < 1.0:
-                    value = center[axis] + arm[axis] * np.cos(turn) + side[axis] * np.sin(turn)
-                    low[row, axis] = min(low[row, axis], value)
-                    high[row, axis] = max(high[row, axis], value)
+    """Lowest and highest coordinates that each move reaches, (m,d) each, its start apart.
+
+    An arc reaches beyond its ends where a coordinate's derivative along it is zero.
+    """
+    low, high = program.target.copy(), program.target.copy()
+    arcs = np.flatnonzero(program.motion == Motion.ARC)
+    if arcs.size:
+        start = _starts(program)[arcs, :3]
+        lowest, highest = _arc_extent(
+            start, program.target[arcs, :3], program.center[arcs], program.normal[arcs], program.sweep[arcs]
+        )
+        low[arcs, :3] = np.minimum(low[arcs, :3], lowest)
+        high[arcs, :3] = np.maximum(high[arcs, :3], highest)
     return low, high
 
 
-def check_travel(program: Program, travel: dict[str, tuple[float, float]]) -> None:
+def _arc_extent(
+    start: FloatArray, end: FloatArray, center: FloatArray, normal: FloatArray, sweep: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Extremes of arcs strictly inside their sweep, (k,3) each; inf and -inf where there are none.
+
+    After the angle t a coordinate is ``c + r(t) A cos(t - t0) + h t``, the radius r linear in t. Its
+    derivative vanishes near t0 + k pi, once for each k; Newton's method goes from there. As r and the height
+    are linear in t, only the first and the last extreme of each kind can be the outermost: that bounds the
+    work for any number of turns.
+    """
+    arm = start - center
+    rise = _dot(end - start, normal)
+    last = end - center - rise[:, None] * normal
+    radius, last_radius = _norm(arm[:, 0], arm[:, 1], arm[:, 2]), _norm(last[:, 0], last[:, 1], last[:, 2])
+    total = np.abs(sweep)[:, None, None]
+    along = arm / radius[:, None]
+    across = _cross(normal, along) * np.sign(sweep)[:, None]
+    share = np.sqrt(along * along + across * across)[:, :, None]  # A, 0 along the normal
+    climb = normal[:, :, None] * rise[:, None, None] / total  # h
+    slope = (last_radius - radius)[:, None, None] / total
+    origin = np.arctan2(across, along)[:, :, None]  # t0
+    first = np.floor(-origin / np.pi)
+    final = np.ceil((total - origin) / np.pi)
+    half_turns = np.concatenate([first, first + 1, first + 2, final - 2, final - 1, final], axis=2)
+    angle = origin + np.pi * half_turns
+    relative_climb = climb / np.maximum(share, 1e-12)
+    for _ in range(6):
+        r = radius[:, None, None] + slope * angle
+        cosine, sine = np.cos(angle - origin), np.sin(angle - origin)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = (slope * cosine - r * sine + relative_climb) / (2.0 * slope * sine + r * cosine)
+        angle = angle + np.where(np.abs(step) < 1.0, step, 0.0)
+    r = radius[:, None, None] + slope * angle
+    value = center[:, :, None] + r * share * np.cos(angle - origin) + climb * angle
+    inside = (angle > 0.0) & (angle < total)
+    return np.where(inside, value, np.inf).min(axis=2), np.where(inside, value, -np.inf).max(axis=2)
+
+
+def check_travel(program: Program, travel: Mapping[str, tuple[float, float]]) -> None:
     """Refuse the first move that leaves an axis's travel.
 
     Raises
@@ -147,10 +230,12 @@ def check_travel(program: Program, travel: dict[str, tuple[float, float]]) -> No
         outside = np.flatnonzero((low[:, column] < lower - 1e-9) | (high[:, column] > upper + 1e-9))
         if outside.size:
             row = int(outside[0])
-            reached = low[row, column] if low[row, column] < lower else high[row, column]
+            reached = low[row, column] if low[row, column] < lower - 1e-9 else high[row, column]
+            unit, key, scale = ("°", "travel_deg", DEGREE) if axis in ROTARY else (" mm", "travel_mm", 1.0)
             raise InfeasibleError(
-                f"{axis.upper()} reaches {reached:.6g} mm, beyond its travel of {lower:g} to {upper:g} mm",
-                hint="move the part, or widen the axis's travel_mm in the machine file",
+                f"{axis.upper()} reaches {reached / scale:.6g}{unit}, "
+                f"beyond its travel of {lower / scale:g} to {upper / scale:g}{unit}",
+                hint=f"move the part, or widen the axis's {key} in the machine file",
                 source=program.source,
                 line=int(program.line[row]),
             )

@@ -19,5 +19,7 @@ def shared() -> Path:
     """Return the folder of reference data beside the project; skip where it is absent."""
     folder = Path(os.environ.get("CNC_SHAPE_SHARED", ROOT.parent / "shared"))
     if not folder.is_dir():
+        if os.environ.get("CNC_SHAPE_REQUIRE_SHARED") == "1":
+            pytest.fail(f"reference data is required here and absent: {folder}")
         pytest.skip(f"reference data absent: {folder} (name it with CNC_SHAPE_SHARED)")
     return folder

@@ -1,0 +1,84 @@
+r"""The command line: one file a command, and the table that registers them.
+
+A command is a plain function: its signature is its options, its docstring its help. It loads, calls the
+floors below and renders; it returns None, or the exit code where that is not 0. Whatever is heavy (numpy,
+numba, pydantic, yaml, rich) is imported inside the function, so that ``--help`` and ``--version`` answer at
+once. In a docstring write ``\[`` for ``[``: help is rich markup.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Annotated, Final
+
+import typer
+
+from cnc_shape import __version__
+from cnc_shape.cli.apply import apply
+from cnc_shape.cli.check import check
+from cnc_shape.cli.design import design
+from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
+from cnc_shape.cli.init import init
+from cnc_shape.cli.output import print_text
+from cnc_shape.cli.simulate import simulate
+
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init)
+
+app = typer.Typer(
+    name="cnc-shape",
+    invoke_without_command=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print_text(f"cnc-shape {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def cnc_shape(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """From a G-code program to its contour error: motion, input shaping, servo and structure."""
+    if context.invoked_subcommand is None:
+        if text := context.get_help():
+            print_text(text)
+        raise typer.Exit(WRONG_INPUT)
+
+
+for _command in COMMANDS:
+    app.command(name=_command.__name__)(_command)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line (without the program's name) and return its exit code."""
+    command = typer.main.get_command(app)
+    words = list(arguments)
+    return guarded(
+        lambda: command.main(args=words, prog_name="cnc-shape", standalone_mode=False), json="--json" in words
+    )
+
+
+def _terminate(signum: int, frame: FrameType | None) -> None:
+    raise Terminated
+
+
+def main() -> None:
+    """Run the command line of this process and leave with its exit code."""
+    signal.signal(signal.SIGTERM, _terminate)
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115  # closed by whoever started us
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):  # a file name need not be text
+        if reconfigure := getattr(stream, "reconfigure", None):
+            reconfigure(errors="backslashreplace")
+    sys.exit(run(sys.argv[1:]))

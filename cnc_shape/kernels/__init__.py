@@ -15,10 +15,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar
-
-P = ParamSpec("P")
-R = TypeVar("R")
+from typing import Any
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -66,6 +63,10 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 import numba  # noqa: E402  # the cache folder must be named first
 
 
-def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` to cached, serial machine code with IEEE arithmetic."""
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile `function` to cached, serial machine code with IEEE arithmetic.
+
+    To the type checker a kernel takes anything and returns anything: its docstring gives shapes and
+    units, and the API function that calls it checks them.
+    """
     return numba.njit(cache=True, error_model="numpy")(function)

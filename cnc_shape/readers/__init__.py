@@ -1,0 +1,143 @@
+"""Readers: text to `Program`. The table `READERS` knows them by the suffix of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cnc_shape.errors import OptionError, ProgramError
+from cnc_shape.program import Program, concatenate
+from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
+from cnc_shape.readers.source import ReadingLimits, Source, lines, open_source
+from cnc_shape.readers.table import TIME, is_table, read_header
+from cnc_shape.readers.timed import TimedPoints, read_timed_points, timed_program
+from cnc_shape.readers.waypoints import read_waypoints
+
+if TYPE_CHECKING:
+    from cnc_shape.toolpath import Toolpath
+    from cnc_shape.trajectory import Trajectory
+
+CSV = "csv"  # dialect of tables
+
+
+class Curve(Enum):
+    """What joins the way-points of a table."""
+
+    POLYLINE = "polyline"
+    SPLINE = "spline"
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingOptions:
+    """How to read a program or a table."""
+
+    gcode: GcodeOptions = field(default_factory=GcodeOptions)
+    curve: Curve = Curve.POLYLINE  # of way-points
+    closed: bool = False  # way-points return to the first
+    rows: int = 16384  # of a chunk
+    limits: ReadingLimits = field(default_factory=ReadingLimits)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Reading:
+    """A program that is being read: what is known beforehand, and its chunks in order."""
+
+    source: str
+    dialect: str
+    lines: int
+    axes: tuple[str, ...]
+    chunks: Iterator[Program]
+    timed: TimedPoints | None = None  # the rows, if the table is a time trajectory
+    evidence: str = ""  # why this dialect
+
+
+Reader = Callable[[Source, ReadingOptions], Reading]
+
+
+def gcode_reading(source: Source, options: ReadingOptions) -> Reading:
+    """Read a program of G-code."""
+    seen = survey(source, options.gcode.dialect)
+    chunks = interpret(source, seen, replace(options.gcode, rows=options.rows, limits=options.limits))
+    return Reading(source.name, seen.dialect.value, seen.lines, seen.axes, chunks, evidence=seen.evidence)
+
+
+def table_reading(source: Source, options: ReadingOptions) -> Reading:
+    """Read way-points, or a time trajectory where the header has a time."""
+    if options.curve is Curve.SPLINE:
+        raise OptionError("--path spline is not built yet", hint="take --path polyline")
+    header = read_header(source)
+    count = sum(1 for _ in lines(source))
+    if TIME in header.names:
+        points = read_timed_points(source, header)
+        return Reading(source.name, CSV, count, header.axes, iter([timed_program(points)]), points)
+    chunks = read_waypoints(source, header, closed=options.closed, rows=options.rows)
+    return Reading(source.name, CSV, count, header.axes, chunks)
+
+
+_GCODE_SUFFIXES = (
+    ".nc",
+    ".ngc",
+    ".gcode",
+    ".gco",
+    ".g",
+    ".tap",
+    ".cnc",
+    ".txt",
+    ".eia",
+    ".iso",
+    ".mpf",
+    ".din",
+)
+READERS: dict[str, Reader] = {**dict.fromkeys(_GCODE_SUFFIXES, gcode_reading), ".csv": table_reading}
+
+
+@contextmanager
+def reading(path: str | Path, options: ReadingOptions | None = None) -> Generator[Reading]:
+    """Open a program or a table; a suffix that no reader claims is decided by the first line.
+
+    Raises
+    ------
+    ProgramError
+        What is wrong with the file, at once or while its chunks are read.
+    """
+    options = options or ReadingOptions()
+    with open_source(path, options.limits) as source:
+        reader = READERS.get(Path(path).suffix.lower())
+        if reader is None:
+            first = next((line for _, line in lines(source) if line.strip()), "")
+            reader = table_reading if is_table(first) else gcode_reading
+        yield reader(source, options)
+
+
+def read_chunks(path: str | Path, options: ReadingOptions | None = None) -> Iterator[Program]:
+    """Yield a program in chunks; memory does not grow with its length."""
+    with reading(path, options) as opened:
+        yield from opened.chunks
+
+
+def read_program(path: str | Path, options: ReadingOptions | None = None) -> Program:
+    """Read a whole program: G-code, or way-points, or the polyline of a time trajectory."""
+    return concatenate(read_chunks(path, options))
+
+
+def read_trajectory(
+    path: str | Path, sample_time: float, options: ReadingOptions | None = None
+) -> tuple[Trajectory, Toolpath]:
+    """Read a time trajectory, resampled linearly at `sample_time` s, and the polyline through its rows.
+
+    Raises
+    ------
+    ProgramError
+        As `reading`; the table has no time.
+    """
+    from cnc_shape.readers.trajectories import resample  # what only reads programs need not load the kernels
+
+    options = options or ReadingOptions()
+    with reading(path, options) as opened:
+        if opened.timed is None:
+            raise ProgramError(opened.source, 1, 1, "no column is the time", hint="name a column time_s")
+        return resample(opened.timed, sample_time, samples=options.limits.samples)

@@ -1,0 +1,1 @@
+"""Writers: results that are whole or absent, read back before they are published."""

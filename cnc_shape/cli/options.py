@@ -1,0 +1,25 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Machine = Annotated[
+    str | None,
+    typer.Option(
+        "-m",
+        "--machine",
+        envvar="CNC_SHAPE_MACHINE",
+        help="Machine file; without it the bundled two-mode XY stage.",
+        show_default=False,
+    ),
+]
+Dialect = Annotated[str, typer.Option(help="auto, rs274, grbl, marlin or fanuc.")]
+BlockDelete = Annotated[bool, typer.Option("--block-delete", help="Skip lines that start with /.")]
+PathStyle = Annotated[str, typer.Option("--path", help="How CSV way-points are joined: polyline.")]
+Closed = Annotated[bool, typer.Option("--closed", help="Join the last CSV way-point to the first.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no warnings.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]

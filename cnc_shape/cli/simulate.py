@@ -1,0 +1,140 @@
+"""``cnc-shape simulate``: a program through the whole chain, and the table of its contour error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Force, Json, Machine, PathStyle, Quiet
+
+if TYPE_CHECKING:
+    from cnc_shape.pipeline import Run
+    from cnc_shape.report.figures import Format
+    from cnc_shape.report.folder import Context
+
+SAMPLE = "bracket.nc"
+
+
+def simulate(
+    file: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[FILE]", help="G-code or CSV; - for standard input; without it the bundled bracket."
+        ),
+    ] = None,
+    machine: Machine = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write a run folder with page, figures and signals.")
+    ] = False,
+    output: Annotated[
+        str | None, typer.Option("-o", "--output", metavar="DIR", help="The run folder; implies --report.")
+    ] = None,
+    cases: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Rows of the table, such as unshaped,shaped.")
+    ] = None,
+    fail_on: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CONDITION", help='Exit 1 if the last row meets it: "max_contour_um>20".'),
+    ] = None,
+    figures: Annotated[str, typer.Option(help="Format of the figures: svg, png or pdf.")] = "svg",
+    dialect: Dialect = "auto",
+    block_delete: BlockDelete = False,
+    path: PathStyle = "polyline",
+    closed: Closed = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
+    from cnc_shape.api import report_context
+    from cnc_shape.cli.errors import DONE, GATE_FAILED
+    from cnc_shape.cli.gate import parse_gate
+    from cnc_shape.cli.output import print_error, print_json, warn
+    from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.reading import named_options
+    from cnc_shape.config.bundled import bundled
+    from cnc_shape.config.machine_file import load_machine
+    from cnc_shape.opening import open_motion
+    from cnc_shape.pipeline import default_cases, pick_cases, run
+    from cnc_shape.report.table import summary_json
+
+    gates = [parse_gate(text) for text in fail_on or []]
+    kind = _figure_format(figures)
+    setup = load_machine(machine)
+    picked = (
+        default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
+    )
+    wanted = report or output is not None
+    if output is not None:
+        _check_folder(Path(output), force=force)
+    source = file if file is not None else str(bundled(SAMPLE))
+    options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
+    with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
+        result = run(motion.blocks, setup, picked, motion.name, record=wanted)
+    warnings = [*setup.warnings, *motion.warnings()]
+    page = None
+    if wanted:
+        command = ["simulate", motion.name, *(["--cases", cases] if cases else [])]
+        context = report_context([source], setup, command, warnings, kind)
+        page = _report(result, output, context, force=force)
+    warn(warnings, quiet=quiet)
+    if json:
+        extra = {} if page is None else {"report": str(page)}
+        print_json(
+            "simulate", {**{k: v for k, v in summary_json(result.summary).items() if k != "schema"}, **extra}
+        )
+    else:
+        _print_table(result, page)
+    failures = [failure for gate in gates if (failure := gate.failure(result.summary)) is not None]
+    for failure in failures:
+        print_error(failure)
+    return GATE_FAILED if failures else DONE
+
+
+def _figure_format(text: str) -> Format:
+    from cnc_shape.errors import OptionError
+
+    formats: dict[str, Format] = {"svg": "svg", "png": "png", "pdf": "pdf"}
+    if text not in formats:
+        raise OptionError(f"figures come as {', '.join(formats)}, not {text!r}")
+    return formats[text]
+
+
+def _check_folder(folder: Path, *, force: bool) -> None:
+    from cnc_shape.report.folder import MARKER
+    from cnc_shape.writers.publish import check_folder
+
+    check_folder(folder, MARKER, force=force)
+
+
+def _report(result: Run, output: str | None, context: Context, *, force: bool) -> Path:
+    from cnc_shape.report.folder import RUNS, default_folder, write_report
+
+    if output is not None:
+        return write_report(result, Path(output), context, force=force)
+    folder = default_folder(result, context)
+    _make_parent(Path(RUNS))
+    return write_report(result, folder, context, force=True)  # its name is its content's
+
+
+def _make_parent(folder: Path) -> None:
+    from cnc_shape.errors import OutputError
+
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as fault:
+        reason = (fault.strerror or str(fault)).lower()
+        raise OutputError(f"cannot make {folder}: {reason}", hint="name a folder with -o DIR") from fault
+
+
+def _print_table(result: Run, page: Path | None) -> None:
+    from rich.console import Console
+
+    from cnc_shape.report.table import build_table
+
+    console = Console(highlight=False, soft_wrap=False)
+    console.print(build_table(result.summary, console.width))
+    if page is not None:
+        console.print(f"report: {page}", soft_wrap=True, markup=False)

@@ -1,0 +1,43 @@
+"""Check of a machine file: what it says, in numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cnc_shape.config.complaints import locate
+from cnc_shape.config.machine_file import read_content, read_machine
+from cnc_shape.config.yaml_tree import refuse
+from cnc_shape.controllers.stability import check_stability
+from cnc_shape.errors import InfeasibleError
+
+
+def check_machine(path: Path | str) -> dict[str, object]:
+    """Read a machine file and return what it describes, ready for JSON.
+
+    A loop that would oscillate without end is refused here, before anybody simulates it.
+
+    Raises
+    ------
+    ConfigError
+        As `load_machine`, or an unstable loop.
+    """
+    source, data = read_content(path)
+    setup, notes, tree = read_machine(data, source)
+    try:
+        check_stability(setup.machine.axes, setup.control)
+    except InfeasibleError as error:
+        refuse(source, locate(tree, ("control",))[0], f"control: {error.reason}", error.hint)
+    return {
+        "file": source,
+        "dialect": "machine",
+        "name": setup.machine.name,
+        "axes": [axis.name for axis in setup.machine.axes],
+        "modes": {axis.name: len(axis.modes) for axis in setup.machine.axes},
+        "shapers": {
+            name: {"type": setup.choices[name].type, "duration_s": shaper.duration, "delay_s": shaper.delay}
+            for name, shaper in setup.shapers.items()
+        },
+        "sample_time_s": setup.control.sample_time,
+        "tools": len(setup.tools),
+        "warnings": [{"line": note.line, "message": note.message} for note in notes],
+    }

@@ -1,0 +1,130 @@
+"""Setup -> machine file: what a run was made with, to be read back to the same values."""
+
+from __future__ import annotations
+
+from math import inf, isfinite, nextafter
+
+import yaml
+
+from cnc_shape.config.setup import Setup
+from cnc_shape.controllers import Control
+from cnc_shape.limits import Limits
+from cnc_shape.machine import Axis, FirstOrderLag
+from cnc_shape.modes import Mode
+from cnc_shape.program import ROTARY
+from cnc_shape.units import DEGREE
+
+LINE_LENGTH = 110
+
+
+class _Dumper(yaml.SafeDumper):
+    """Text in quotes: what is no number to one reader of YAML may be one to another."""
+
+
+def _quoted(dumper: _Dumper, text: str) -> yaml.Node:
+    plain = text.isidentifier() and text not in ("y", "n")
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if plain else '"')
+
+
+_Dumper.add_representer(str, _quoted)
+
+
+def dump_machine(setup: Setup) -> str:
+    """Return `setup` as a machine file; loading it gives an equal setup."""
+    document: dict[str, object] = {
+        "name": setup.machine.name,
+        "kinematics": {"type": "cartesian"},
+        "axes": {axis.name: _axis(axis, setup) for axis in setup.machine.axes},
+        "planning": {
+            "path_tolerance_mm": setup.planning.path_tolerance,
+            "shaping": setup.planning.shaping.value,
+        },
+        "control": _control(setup.control),
+    }
+    if setup.tools:
+        document["tools"] = [
+            {"number": tool.number, "length_mm": tool.length, "diameter_mm": tool.diameter}
+            for tool in setup.tools
+        ]
+    return yaml.dump(
+        document,
+        Dumper=_Dumper,
+        sort_keys=False,
+        default_flow_style=None,
+        allow_unicode=True,
+        width=LINE_LENGTH,
+    )
+
+
+def _axis(axis: Axis, setup: Setup) -> dict[str, object]:
+    keys: dict[str, object] = {
+        "limits": _degrees(axis.limits) if axis.name in ROTARY else _millimetres(axis.limits)
+    }
+    if isinstance(axis.drive, FirstOrderLag):
+        keys["drive"] = {
+            "type": "first_order_lag",
+            "time_constant_s": axis.drive.time_constant,
+            "gain": axis.drive.gain,
+        }
+    if axis.modes:
+        keys["modes"] = [_mode(mode) for mode in axis.modes]
+    if choice := setup.choices.get(axis.name):
+        keys["shaper"] = {"type": choice.type, **choice.options}
+    return keys
+
+
+def _millimetres(limits: Limits) -> dict[str, object]:
+    keys: dict[str, object] = {
+        "velocity_mm_s": limits.velocity,
+        "acceleration_mm_s2": limits.acceleration,
+    }
+    if isfinite(limits.jerk):
+        keys["jerk_mm_s3"] = limits.jerk
+    if isfinite(limits.travel[0]):
+        keys["travel_mm"] = list(limits.travel)
+    return keys
+
+
+def _degrees(limits: Limits) -> dict[str, object]:
+    travel = (to_degrees(limits.travel[0]), to_degrees(limits.travel[1]))
+    keys = _millimetres(
+        Limits(to_degrees(limits.velocity), to_degrees(limits.acceleration), to_degrees(limits.jerk), travel)
+    )
+    return {key.replace("_mm", "_deg"): value for key, value in keys.items()}
+
+
+def to_degrees(angle: float) -> float:
+    """Return the shortest number of degrees that is read back as exactly this `angle`, rad."""
+    nearest = angle / DEGREE
+    if not isfinite(nearest):
+        return nearest
+    below, above = nextafter(nearest, -inf), nextafter(nearest, inf)
+    near = [nextafter(below, -inf), below, nearest, above, nextafter(above, inf)]
+    same = [degrees for degrees in near if degrees * DEGREE == angle]
+    return min(same, key=lambda degrees: len(repr(degrees)), default=nearest)
+
+
+def _mode(mode: Mode) -> dict[str, object]:
+    keys: dict[str, object] = {
+        "frequency_hz": mode.natural_frequency,
+        "damping_ratio": mode.damping_ratio,
+        "participation": mode.participation,
+    }
+    if mode.frequency_uncertainty:
+        keys["frequency_uncertainty"] = mode.frequency_uncertainty
+    return keys
+
+
+def _control(control: Control) -> dict[str, object]:
+    keys: dict[str, object] = {
+        "sample_time_s": control.sample_time,
+        "position_gain_per_s": control.position_gain,
+        "delay_samples": control.delay_samples,
+    }
+    if feed := control.feedforward:
+        shares = {"velocity": feed.velocity, "acceleration": feed.acceleration}
+        model = {"model_time_constant_s": feed.model_time_constant, "model_gain": feed.model_gain}
+        keys["feedforward"] = shares | {key: value for key, value in model.items() if value is not None}
+    if couple := control.cross_coupling:
+        keys["cross_coupling"] = {"estimator": "tangent", "proportional_per_s": couple.proportional}
+    return keys

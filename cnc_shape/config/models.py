@@ -1,0 +1,184 @@
+"""The keys of a machine file: their types, units, bounds and defaults.
+
+The bounds are those within which a number can be meant: beyond them it is a slip of the pen, or asks for
+more memory than there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field
+
+from cnc_shape.config.shaper_options import AnyShaper
+from cnc_shape.config.strict import One, Strict, Zero, refuse_value
+
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+Gain = Annotated[float, Field(ge=0.0, le=1e6)]
+Share = Annotated[float, Field(ge=0.0, le=10.0)]
+Length = Annotated[float, Field(ge=0.0, le=1e6)]
+Coordinate = Annotated[float, Field(ge=-1e9, le=1e9)]
+Duration = Annotated[float, Field(ge=1e-6, le=1e3)]
+
+
+def _increasing(bounds: list[float]) -> list[float]:
+    if bounds[0] >= bounds[1]:
+        refuse_value(f"the lower end {bounds[0]:g} is not below the upper end {bounds[1]:g}", "swap them")
+    return bounds
+
+
+Interval = Annotated[list[Coordinate], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+
+
+class CartesianModel(Strict):
+    """One drive per axis."""
+
+    values_not_built: ClassVar[Mapping[str, frozenset[str]]] = {
+        "type": frozenset({"corexy", "linear_delta", "cubic_parallel", "stewart", "trunnion_ac"})
+    }
+    type: Literal["cartesian"]
+
+
+class LinearLimits(Strict):
+    """What a linear axis may do."""
+
+    velocity_mm_s: Positive
+    acceleration_mm_s2: Positive
+    jerk_mm_s3: Annotated[float, Field(gt=0.0, le=1e12)] | None = None
+    travel_mm: Interval | None = None
+
+
+class RotaryLimits(Strict):
+    """What a rotary axis may do."""
+
+    velocity_deg_s: Positive
+    acceleration_deg_s2: Positive
+    jerk_deg_s3: Annotated[float, Field(gt=0.0, le=1e12)] | None = None
+    travel_deg: Interval | None = None
+
+
+class IdealDriveModel(Strict):
+    """A drive that is where it is told to be; the same as no drive."""
+
+    type: Literal["ideal"]
+
+
+class FirstOrderLagModel(Strict):
+    """A velocity drive ``v' = (gain * u - v) / time_constant``."""
+
+    type: Literal["first_order_lag"]
+    time_constant_s: Duration
+    gain: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+
+
+DRIVES_NOT_BUILT = frozenset({"servo_motor"})
+AnyDrive = Annotated[IdealDriveModel | FirstOrderLagModel, Field(discriminator="type")]
+
+
+class ModeModel(Strict):
+    """A vibration mode between drive and tool."""
+
+    frequency_hz: Annotated[float, Field(ge=1e-3, le=1e5)]
+    damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)]
+    participation: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
+    frequency_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+
+
+class _AxisModel(Strict):
+    drive: AnyDrive | None = None
+    modes: list[ModeModel] = Field(default_factory=list[ModeModel], max_length=32)
+    shaper: AnyShaper | None = None
+
+
+class LinearAxisModel(_AxisModel):
+    """An axis in mm."""
+
+    limits: LinearLimits
+
+
+class RotaryAxisModel(_AxisModel):
+    """An axis in degrees."""
+
+    limits: RotaryLimits
+
+
+class AxesModel(Strict):
+    """The axes a machine has."""
+
+    x: LinearAxisModel | None = None
+    y: LinearAxisModel | None = None
+    z: LinearAxisModel | None = None
+    a: RotaryAxisModel | None = None
+    b: RotaryAxisModel | None = None
+    c: RotaryAxisModel | None = None
+
+
+class PlanningModel(Strict):
+    """How motion is planned."""
+
+    keys_not_built: ClassVar[frozenset[str]] = frozenset(
+        {
+            "tool_tolerance_mm", "stop_dwell_shaper_durations", "align", "path_acceleration_mm_s2",
+            "interpolation_period_s", "chord_error_mm",
+        }
+    )  # fmt: skip
+    values_not_built: ClassVar[Mapping[str, frozenset[str]]] = {"shaping": frozenset({"contour", "path"})}
+    path_tolerance_mm: Annotated[float, Field(ge=1e-6, le=100.0)] = 0.01
+    shaping: Literal["axis", "none"] = "axis"
+
+
+class FeedforwardModel(Strict):
+    """What is fed forward, and through which drive model."""
+
+    velocity: Share = 0.0
+    acceleration: Share = 0.0
+    model_time_constant_s: Annotated[float, Field(ge=0.0, le=1e3)] | None = None
+    model_gain: Annotated[float, Field(ge=1e-3, le=1e3)] | None = None
+
+
+class CrossCouplingModel(Strict):
+    """How the axes answer the contour error together."""
+
+    values_not_built: ClassVar[Mapping[str, frozenset[str]]] = {
+        "estimator": frozenset({"foot_point", "circle"}),
+        "form": frozenset({"scalar"}),
+    }
+    estimator: Literal["tangent"] = "tangent"
+    proportional_per_s: Gain
+    integral_per_s2: Zero = 0.0
+    derivative: Zero = 0.0
+    form: Literal["vector"] = "vector"
+    orientation_per_s: Zero = 0.0
+
+
+class ControlModel(Strict):
+    """The servo loop."""
+
+    keys_not_built: ClassVar[frozenset[str]] = frozenset({"disturbance_observer", "inertia_compensation"})
+    sample_time_s: Annotated[float, Field(ge=1e-6, le=1.0)] = 1e-3
+    position_gain_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
+    delay_samples: Annotated[int, Field(ge=0, le=1000)] = 0
+    feedforward: FeedforwardModel | None = None
+    cross_coupling: CrossCouplingModel | None = None
+    jacobian_every: One = 1
+
+
+class ToolModel(Strict):
+    """A row of the tool table."""
+
+    number: Annotated[int, Field(ge=0, le=10**6)]
+    length_mm: Annotated[float, Field(ge=-1e6, le=1e6)] = 0.0
+    diameter_mm: Length = 0.0
+
+
+class MachineModel(Strict):
+    """A whole machine file."""
+
+    keys_not_built: ClassVar[frozenset[str]] = frozenset({"joints", "disturbances"})
+    name: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    kinematics: CartesianModel | None = None
+    axes: AxesModel
+    planning: PlanningModel = PlanningModel()
+    control: ControlModel = ControlModel()
+    tools: list[ToolModel] = Field(default_factory=list[ToolModel], max_length=1000)

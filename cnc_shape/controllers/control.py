@@ -1,0 +1,19 @@
+"""Control: which terms a machine's servo loop is the sum of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cnc_shape.controllers.cross_coupling import CrossCoupling
+from cnc_shape.controllers.feedforward import Feedforward
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """The servo loop: position loop always, the other terms where they are given."""
+
+    sample_time: float = 1e-3  # s
+    position_gain: float = 20.0  # 1/s
+    delay_samples: int = 0  # the drive hears its command this many samples late
+    feedforward: Feedforward | None = None
+    cross_coupling: CrossCoupling | None = None

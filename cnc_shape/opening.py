@@ -1,0 +1,93 @@
+"""Opening a program, a table of way-points or a time trajectory as a motion that can be run."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from cnc_shape.config.setup import Setup
+from cnc_shape.machine import LINEAR_DEFAULT
+from cnc_shape.motion import Block, lacking, moving, replaying
+from cnc_shape.program import Note, Program
+from cnc_shape.readers import ReadingOptions, reading
+from cnc_shape.readers.trajectories import resample
+
+STANDARD_INPUT = "-"
+
+
+@dataclass(slots=True)
+class OpenMotion:
+    """A motion that is being read and planned; ask for `warnings` when it is over."""
+
+    name: str
+    path: str
+    setup: Setup
+    blocks: Iterator[Block]
+    notes: list[Note] = field(default_factory=list[Note])
+    moved: tuple[str, ...] = ()
+
+    def warnings(self) -> list[str]:
+        """What the reader had to say, and which axes the machine does not describe."""
+        told = [f"{self.path}:{note.line}: warning: {note.message}" for note in self.notes]
+        missing = lacking(self.setup.machine, self.moved)
+        if missing:
+            names = ", ".join(axis.upper() for axis in missing)
+            told.append(
+                f"warning: the machine lacks {names}, which the program moves: taken as ideal, "
+                f"{LINEAR_DEFAULT.velocity:g} mm/s, {LINEAR_DEFAULT.acceleration:g} mm/s² (90 °/s, 900 °/s²), "
+                "unlimited travel"
+            )
+        return told
+
+
+@contextmanager
+def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) -> Generator[OpenMotion]:
+    """Open a file and plan it as it is read; where it tells the time itself, replay it.
+
+    Tool lengths are the machine's where `options` have none.
+
+    Raises
+    ------
+    ProgramError
+        What is wrong with the file, at once or while the blocks are drawn.
+    InfeasibleError
+        While the blocks are drawn: what no motion can satisfy.
+    """
+    period = setup.control.sample_time
+    options = options or ReadingOptions()
+    if not options.gcode.tools:
+        options = replace(options, gcode=replace(options.gcode, tools=setup.tools))
+    with reading(path, options) as opened:
+        name = "stdin" if path == STANDARD_INPUT else Path(path).name
+        motion = OpenMotion(name, opened.source, setup, iter(()))
+        if opened.timed is not None:
+            command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
+            blocks = replaying(command, toolpath)
+        else:
+            chunks = _noted(opened.chunks, motion.notes)
+            blocks = moving(chunks, setup.machine, setup.planning.path_tolerance, period)
+        motion.blocks = _watched(blocks, motion)
+        yield motion
+
+
+def digest(path: str) -> str:
+    """SHA-256 of a file; of standard input, which is gone by now, a dash."""
+    if path == STANDARD_INPUT:
+        return "-"
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _noted(chunks: Iterable[Program], notes: list[Note]) -> Iterator[Program]:
+    for chunk in chunks:
+        notes.extend(chunk.notes)
+        yield replace(chunk, notes=())
+
+
+def _watched(blocks: Iterable[Block], motion: OpenMotion) -> Iterator[Block]:
+    for block in blocks:
+        motion.moved = block.moved
+        yield block

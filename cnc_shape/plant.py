@@ -1,0 +1,76 @@
+"""Plant: one axis's drive and structure as one linear system, discretised together and exactly.
+
+State of an axis: ``[q, q', d_1, d_1', d_2, d_2', ...]``, drive position and the deflection of each mode,
+
+    d_k'' + 2 zeta_k omega_k d_k' + omega_k^2 d_k = -g_k q''
+
+A lag drive, ``q'' = (gain u - q') / time_constant``, holds its input u over the sample: zero-order hold.
+An ideal drive is where it is told to be. Between samples it follows the cubic through commanded position
+and velocity, whose acceleration is linear over the sample; the modes answer that acceleration exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
+from cnc_shape.machine import Axis, FirstOrderLag
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plant:
+    """Discrete dynamics of all axes: ``x+ = transition x + held u + rising (u_end - u_start)``."""
+
+    transition: FloatArray  # (d,s,s)
+    held: FloatArray  # (d,s) answer to an input held over the sample
+    rising: FloatArray  # (d,s) answer to an input that grows linearly by 1 over the sample
+    states: IntArray  # (d,) states in use
+    ideal: IntArray  # (d,) 1: the drive is where it is told to be
+
+
+def continuous(axis: Axis) -> tuple[FloatArray, FloatArray]:
+    """State matrix (s,s) and input vector (s,) of an axis; the input of an ideal drive is q''."""
+    states = 2 + 2 * len(axis.modes)
+    A, B = np.zeros((states, states)), np.zeros(states)
+    A[0, 1] = 1.0
+    if isinstance(axis.drive, FirstOrderLag):
+        A[1, 1] = -1.0 / axis.drive.time_constant
+        B[1] = axis.drive.gain / axis.drive.time_constant
+    else:
+        B[1] = 1.0
+    for k, mode in enumerate(axis.modes):
+        row = 2 + 2 * k
+        A[row, row + 1] = 1.0
+        A[row + 1, row] = -(mode.omega**2)
+        A[row + 1, row + 1] = -2.0 * mode.damping_ratio * mode.omega
+        A[row + 1] -= mode.participation * A[1]
+        B[row + 1] = -mode.participation * B[1]
+    return A, B
+
+
+def discretise(axes: Sequence[Axis], sample_time: float) -> Plant:
+    """Discretise every axis at `sample_time` (s) by one matrix exponential each."""
+    most = max(2 + 2 * len(axis.modes) for axis in axes)
+    transition = np.zeros((len(axes), most, most))
+    held, rising = np.zeros((len(axes), most)), np.zeros((len(axes), most))
+    for row, axis in enumerate(axes):
+        A, B = continuous(axis)
+        s = B.size
+        # one exponential gives the answers to a step and to a ramp of the input
+        augmented = np.zeros((s + 2, s + 2))
+        augmented[:s, :s], augmented[:s, s], augmented[s, s + 1] = A, B, 1.0 / sample_time
+        answer = expm(augmented * sample_time)
+        transition[row, :s, :s] = answer[:s, :s]
+        held[row, :s] = answer[:s, s]
+        rising[row, :s] = answer[:s, s + 1]
+    return Plant(
+        frozen(transition),
+        frozen(held),
+        frozen(rising),
+        frozen_integers([2 + 2 * len(axis.modes) for axis in axes]),
+        frozen_integers([not isinstance(axis.drive, FirstOrderLag) for axis in axes]),
+    )

@@ -1,0 +1,111 @@
+"""Way-points of a path as CSV: ``x_mm,y_mm,…[,feed_mm_min]``, joined by straight feeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
+from cnc_shape.errors import ProgramError
+from cnc_shape.program import XYZ, Motion, Note, PathMode, Program
+from cnc_shape.readers.source import Source
+from cnc_shape.readers.table import FEED, Header, read_rows
+from cnc_shape.toolpath import rotary_travel, travel_lengths
+from cnc_shape.units import DEGREE
+
+SLOWEST = 1e-8  # mm/s, of a way-point's feed
+
+
+def positions(header: Header, table: FloatArray) -> FloatArray:
+    """Columns of the axes in order, (n,d) mm or rad; an axis the table lacks stays at 0."""
+    columns = [
+        table[:, header.names.index(axis)] if axis in header.names else np.zeros(len(table))
+        for axis in header.axes
+    ]
+    return np.column_stack(columns)
+
+
+def polyline(source: str, axes: tuple[str, ...], points: FloatArray, line: IntArray) -> Program:
+    """Straight feeds from the first of `points` (n,d) through the others, as fast as the axes can."""
+    count = len(points) - 1
+    nan = frozen(np.full(count, np.nan))
+    return Program(
+        source=source,
+        axes=axes,
+        start=frozen(points[0]),
+        motion=frozen_integers(np.full(count, int(Motion.FEED))),
+        target=frozen(points[1:]),
+        center=frozen(np.zeros((count, 3))),
+        normal=frozen(np.tile([0.0, 0.0, 1.0], (count, 1))),
+        sweep=frozen(np.zeros(count)),
+        feed_rate=frozen(np.full(count, np.inf)),
+        dwell=frozen(np.zeros(count)),
+        path_mode=frozen_integers(np.full(count, int(PathMode.BLEND))),
+        path_tolerance=nan,
+        merge_tolerance=nan,
+        line=frozen_integers(line[1:]),
+    )
+
+
+def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -> Iterator[Program]:
+    """Yield the polyline through the way-points in chunks of `rows` moves.
+
+    The path starts at the first way-point; a row's feed belongs to the move that ends there. A move of rotary
+    axes alone takes it in degrees, as in G-code.
+
+    Parameters
+    ----------
+    source, header
+        The text, and its first line.
+    closed
+        Whether a last move returns to the first way-point.
+    rows
+        Of a chunk, at least 1.
+
+    Raises
+    ------
+    ProgramError
+        As `read_rows`; a feed that is not positive or next to nothing; fewer than two way-points.
+    """
+    kept: list[list[float]] = []
+    numbers: list[int] = []
+    first: tuple[int, list[float]] | None = None
+    feed = header.names.index(FEED) if FEED in header.names else None
+    note = () if feed is not None else (Note(1, "no column feed_mm_min: the axes go as fast as they can"),)
+    found = handed = 0
+    for number, values in read_rows(source, header):
+        if feed is not None and values[feed] < SLOWEST:
+            reason = f"the feed is below the limit of {SLOWEST:g} mm/s"
+            raise ProgramError(source.name, number, 1, reason, hint="give the feed of the move")
+        first = first or (number, values)
+        kept.append(values)
+        numbers.append(number)
+        found += 1
+        if len(kept) > rows:
+            yield _chunk(source.name, header, kept, numbers, note)
+            kept, numbers, note, handed = kept[-1:], numbers[-1:], (), handed + rows
+    if first is None or found < 2:
+        raise ProgramError(
+            source.name, None, None, "fewer than two way-points", hint="a path has two points at least"
+        )
+    if closed:
+        kept.append(first[1])
+        numbers.append(first[0])
+    if len(kept) > 1 or not handed:
+        yield _chunk(source.name, header, kept, numbers, note)
+
+
+def _chunk(
+    source: str, header: Header, rows: list[list[float]], numbers: list[int], notes: tuple[Note, ...]
+) -> Program:
+    table = np.array(rows, dtype=np.float64)
+    program = polyline(source, header.axes, positions(header, table), np.array(numbers, dtype=np.int64))
+    if FEED not in header.names:
+        return replace(program, notes=notes)
+    feed = table[1:, header.names.index(FEED)]
+    if len(header.axes) > len(XYZ):
+        alone = (travel_lengths(program) == 0.0) & (rotary_travel(program) > 0.0)
+        feed = np.where(alone, feed * DEGREE, feed)
+    return replace(program, feed_rate=frozen(feed), notes=notes)

@@ -1,0 +1,207 @@
+"""The run folder: page, numbers, signals, figures, and what it takes to run it again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import string
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cnc_shape import __version__
+from cnc_shape.arrays import FloatArray
+from cnc_shape.errors import InfeasibleError
+from cnc_shape.modes import Mode
+from cnc_shape.pipeline import Run
+from cnc_shape.program import ROTARY
+from cnc_shape.recording import Signals
+from cnc_shape.report import figures
+from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.table import summary_json, tables_csv
+from cnc_shape.shapers import Shaper
+from cnc_shape.units import DEGREE
+from cnc_shape.writers.archive import write_archive
+from cnc_shape.writers.publish import make_folder, publish_folder
+
+RUNS = "cnc-shape-runs"
+MARKER = "run.json"
+NAME_LETTERS = frozenset(string.ascii_letters + string.digits + "-_")
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What a run was made from; nothing in it may depend on the time or the place of the run."""
+
+    command: Sequence[str] = ()  # the command line, without paths of this machine's own
+    inputs: Mapping[str, str] = field(default_factory=dict[str, str])  # name: SHA-256 of every file read
+    machine: str = ""  # resolved machine file, YAML
+    shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper])
+    modes: Mapping[str, Sequence[Mode]] = field(default_factory=dict[str, Sequence[Mode]])
+    warnings: Sequence[str] = ()
+    figure_format: figures.Format = "svg"
+    program: Path | None = None  # where the program's text lies, to show its worst lines
+
+
+NO_CONTEXT = Context()
+
+
+def default_folder(run: Run, context: Context) -> Path:
+    """``cnc-shape-runs/<program>-<hash of inputs, machine and command>``."""
+    digest = hashlib.sha256(_run_json(context)).hexdigest()[:8]
+    stem = "".join(c if c in NAME_LETTERS else "-" for c in Path(run.summary.program).stem)
+    return Path(RUNS) / f"{stem[:60].strip('-') or 'run'}-{digest}"
+
+
+def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *, force: bool = False) -> Path:
+    """Write the run folder, whole or not at all; the same run gives the same bytes.
+
+    Parameters
+    ----------
+    run
+        Summary and signals, one set of signals a case.
+    folder
+        The folder to make. One under ``cnc-shape-runs`` may take the place of an older one, since its name
+        says what it holds.
+    context
+        What the run was made from.
+    force
+        Replace an older run folder.
+
+    Returns
+    -------
+    Path
+        Of the page, ``report.html``.
+
+    Raises
+    ------
+    OutputError
+        The folder exists and `force` is not given, or cannot be written.
+    InfeasibleError
+        A number that is not finite; it names the signal and the time.
+    ValueError
+        A run without signals.
+    """
+    if len(run.signals) != len(run.summary.cases):
+        raise ValueError(f"{len(run.signals)=} for {len(run.summary.cases)=}")
+    folder = Path(folder)
+    for signals in run.signals:
+        _require_finite(signals)
+    drawn = draw(run, context)
+    svg = {name: figures.render(figure, "svg") for name, figure in drawn.items()}
+    page = Page(svg, context.shapers, context.modes, context.warnings, context.program, context.machine)
+    kind = context.figure_format
+    content = {
+        "report.html": _encoded(render_html(run, page)),
+        "results.json": _json(summary_json(run.summary)),
+        "tables.csv": _encoded(tables_csv(run.summary)),
+        "machine.yaml": _encoded(context.machine),
+        MARKER: _run_json(context),
+    }
+    for name, figure in drawn.items():
+        content[f"figures/{name}.{kind}"] = svg[name] if kind == "svg" else figures.render(figure, kind)
+
+    def build(target: Path) -> None:
+        (target / "figures").mkdir()
+        for name, data in content.items():
+            (target / name).write_bytes(data)
+        with (target / "signals.npz").open("wb") as file:
+            write_archive(file, signal_arrays(run.signals))
+
+    ours = folder.parent.name == RUNS
+    if ours:
+        make_folder(folder.parent)
+    publish_folder(folder, build, marker=MARKER, force=force or ours)
+    return folder / "report.html"
+
+
+def _require_finite(signals: Signals) -> None:
+    for item in fields(Signals):
+        value = getattr(signals, item.name)
+        if isinstance(value, np.ndarray):
+            _check(signals, item.name, np.asarray(value, dtype=np.float64))
+
+
+def _check(signals: Signals, name: str, values: FloatArray) -> None:
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        row, *column = bad[0].tolist()
+        axis = f" of {signals.axes[column[0]].upper()}" if column else ""
+        value, time = values[row, *column], signals.time[row]
+        raise InfeasibleError(
+            f"{name}{axis} of the case {signals.case} is {value} at t = {time:.6g} s",
+            hint="the motion ran away: lower the gains of its loop, or check its shapers",
+        )
+
+
+def draw(run: Run, context: Context) -> dict[str, Any]:
+    """All figures of a run, by name."""
+    drawn = {
+        "path": figures.path_figure(run),
+        "error": figures.error_figure(run),
+        "motion": figures.motion_figure(run),
+        "vibration": figures.vibration_figure(run),
+    }
+    if context.shapers:
+        drawn["shapers"] = figures.shaper_figure(context.shapers, context.modes)
+    return drawn
+
+
+def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any]]:
+    """Arrays of `signals.npz`: time first, the unit in every name; ``<case>/<signal>_<axis>_<unit>``."""
+    arrays: dict[str, NDArray[Any]] = {}
+    for case in signals:
+        stem = case.case
+        arrays[f"{stem}/time_s"] = case.time
+        for name, values, unit in (
+            ("command", case.command, ""),
+            ("drives", case.position, ""),
+            ("tool", case.tool, ""),
+            ("velocity", case.velocity, "_s"),
+            ("acceleration", case.acceleration, "_s2"),
+        ):
+            for k, axis in enumerate(case.axes):
+                rotary = axis in ROTARY
+                scale = 1.0 / DEGREE if rotary else 1.0
+                arrays[f"{stem}/{name}_{axis}_{'deg' if rotary else 'mm'}{unit}"] = values[:, k] * scale
+        arrays[f"{stem}/command_contour_error_mm"] = case.command_error
+        arrays[f"{stem}/contour_error_mm"] = case.drive_error
+        arrays[f"{stem}/tool_contour_error_mm"] = case.tool_error
+        arrays[f"{stem}/line"] = case.line
+        arrays[f"{stem}/decimation"] = np.array([case.factor])
+    return arrays
+
+
+def _run_json(context: Context) -> bytes:
+    return _json(
+        {
+            "schema": "cnc-shape/run/1",
+            "versions": versions(),
+            "command": list(context.command),
+            "inputs": dict(context.inputs),
+            "machine_sha256": hashlib.sha256(_encoded(context.machine)).hexdigest(),
+            "warnings": list(context.warnings),
+        }
+    )
+
+
+def versions() -> dict[str, str]:
+    """Versions of what the numbers and the pictures of a run depend on."""
+    names = ("numpy", "scipy", "numba", "matplotlib")
+    python = ".".join(map(str, sys.version_info[:3]))
+    return {"cnc-shape": __version__, "python": python, **{name: version(name) for name in names}}
+
+
+def _json(content: Mapping[str, Any]) -> bytes:
+    return _encoded(json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def _encoded(text: str) -> bytes:
+    """UTF-8; bytes of a file name that are no text are spelled out."""
+    return text.encode("utf-8", "backslashreplace")

@@ -1,0 +1,164 @@
+"""The report's page: one file that opens offline, without scripts, and that no program text can hijack."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from cnc_shape import __version__
+from cnc_shape.modes import Mode
+from cnc_shape.pipeline import Run
+from cnc_shape.report.table import columns, micrometres
+from cnc_shape.report.text import one_line
+from cnc_shape.report.words import best_case, price_of_shaping, verdict, worst_places
+from cnc_shape.shapers import Shaper
+from cnc_shape.shapers.analysis import contour_factor
+
+LONGEST_LINE = 60  # characters of a program line that are shown
+
+CAPTIONS = {
+    "path": "The programmed path (grey) and the tool, its distance to the path magnified.",
+    "error": "Contour error over time, at the tool and at the drives.",
+    "vibration": "Deflection of the structure between drive and tool: all the while, and after the end.",
+    "motion": "Speed and acceleration of the command.",
+    "shapers": "Left: the impulses. Right: the vibration a mode keeps where its real frequency is off.",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What a page shows beside the run itself."""
+
+    figures: Mapping[str, bytes] = field(default_factory=dict[str, bytes])  # SVG, the names of `CAPTIONS`
+    shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper])  # of every shaped axis
+    modes: Mapping[str, Sequence[Mode]] = field(default_factory=dict[str, Sequence[Mode]])
+    warnings: Sequence[str] = ()  # of the reader and the machine file
+    program: Path | None = None  # where the program's text lies
+    machine: str = ""  # the machine file
+
+
+NO_PAGE = Page()
+
+
+def render_html(run: Run, page: Page = NO_PAGE) -> str:
+    """Fill the page: one file without scripts, without a date, without a request to anywhere.
+
+    Names and program text are escaped where they are shown, and control characters spelled out. The
+    content-security policy, which admits our own style sheet by its hash and pictures that lie in the
+    page, is the second wall.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    folder = files("cnc_shape.report").joinpath("templates")
+    style = folder.joinpath("report.css").read_text(encoding="utf-8")
+    template = folder.joinpath("report.html.j2").read_text(encoding="utf-8")
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    environment = Environment(
+        autoescape=True, trim_blocks=True, undefined=StrictUndefined, keep_trailing_newline=True
+    )
+    summary, first, best = run.summary, run.summary.cases[0], best_case(run.summary)
+    pictures = {
+        name: {"data": base64.b64encode(page.figures[name]).decode(), "caption": caption}
+        for name, caption in CAPTIONS.items()
+        if name in page.figures
+    }
+    return environment.from_string(template).render(
+        style=_safe(style),
+        style_hash=f"sha256-{digest}",
+        title=one_line(summary.program),
+        version=__version__,
+        verdict=one_line(verdict(summary)),
+        price=price_of_shaping(summary),
+        facts=[
+            ("Program", one_line(summary.program)),
+            ("Machine", one_line(summary.machine)),
+            ("Cycle time", f"{summary.cycle_time:.3f} s"),
+            ("Servo period", f"{summary.sample_time * 1e3:g} ms"),
+            ("Samples", f"{summary.samples:,}".replace(",", "\u202f")),
+        ],
+        columns=[(column.name, column.unit, column.numbers) for column in columns(summary)],
+        rows=[
+            {
+                "name": one_line(case.name),
+                "best": case is best and best is not first,
+                "cells": [column.cells[k] for column in columns(summary)],
+            }
+            for k, case in enumerate(summary.cases)
+        ],
+        figures=[picture for name, picture in pictures.items() if name != "shapers"],
+        shapers=[_shaper_row(axis, shaper, page.modes[axis]) for axis, shaper in page.shapers.items()],
+        shaper_figure=pictures.get("shapers"),
+        first=one_line(first.name),
+        worst_case=one_line(best.name),
+        worst=_place_rows(run, best.name, page.program) if run.signals else [],
+        warnings=[one_line(warning) for warning in page.warnings],
+        machine=page.machine,
+        factor=max((signals.factor for signals in run.signals), default=1),
+    )
+
+
+def _place_rows(run: Run, case: str, program: Path | None) -> list[dict[str, Any]]:
+    places = worst_places(run, case)
+    text = _program_lines(program, {place.line for place in places})
+    return [
+        {
+            "line": place.line,
+            "text": text.get(place.line, ""),
+            "numbers": (
+                micrometres(place.error),
+                micrometres(place.drive_error),
+                micrometres(place.first_error),
+                f"{place.time:.3f}",
+                *(f"{value:.3f}" for value in place.foot.tolist()),
+            ),
+        }
+        for place in places
+    ]
+
+
+def _program_lines(program: Path | None, wanted: set[int]) -> dict[int, str]:
+    """Text of the lines `wanted`, shortened; none where the program is not at hand."""
+    if program is None or not wanted:
+        return {}
+    try:
+        with program.open("rb") as file:
+            found = {
+                number: line
+                for number, line in enumerate(islice(file, max(wanted)), start=1)
+                if number in wanted
+            }
+    except OSError:
+        return {}
+    return {number: _shortened(line) for number, line in found.items()}
+
+
+def _shortened(line: bytes) -> str:
+    text = one_line(line.decode("utf-8", "backslashreplace").strip())
+    return text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 1] + "…"
+
+
+def _safe(style: str) -> str:
+    """Our own style sheet, the only text that is not escaped."""
+    from markupsafe import Markup
+
+    if "<" in style:
+        raise ValueError("a style sheet holds no markup")
+    return Markup(style)
+
+
+def _shaper_row(axis: str, shaper: Shaper, modes: Sequence[Mode]) -> tuple[str, ...]:
+    return (
+        axis.upper(),
+        ", ".join(f"{mode.natural_frequency:g} Hz (ζ {mode.damping_ratio:g})" for mode in modes) or "-",
+        str(shaper.times.size),
+        f"{shaper.duration * 1e3:.2f}",
+        f"{shaper.delay * 1e3:.2f}",
+        f"{shaper.sum_abs_amplitude:.3f}",
+        f"{contour_factor(shaper, modes):+.3f}" if modes else "-",
+    )

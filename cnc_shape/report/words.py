@@ -1,0 +1,114 @@
+"""A run in words: the verdict in one sentence, the price of shaping, the worst places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cnc_shape.arrays import FloatArray
+from cnc_shape.pipeline import CaseSummary, Run, Summary
+from cnc_shape.recording import Signals
+from cnc_shape.report.table import micrometres, worst_linear
+
+WORST_PLACES = 10
+APART = 0.02  # share of the motion's time that two worst places lie apart at least
+
+
+def best_case(summary: Summary) -> CaseSummary:
+    """The case with the smallest RMS contour error of the tool; the first of equals."""
+    return min(summary.cases, key=lambda case: case.tool.rms)
+
+
+def verdict(summary: Summary) -> str:
+    """What the run says, in one sentence with its numbers."""
+    first, best = summary.cases[0], best_case(summary)
+    worst = (
+        f"{_capital(first.name)}, the tool leaves the programmed path by up to "
+        f"{micrometres(first.tool.max)} µm{_at(first.tool.line)} and {micrometres(first.tool.rms)} µm RMS"
+    )
+    if len(summary.cases) == 1:
+        return f"{worst}; the program takes {first.cycle_time:.3f} s."
+    if best is first:
+        return f"{worst}, and no other case does better; the program takes {first.cycle_time:.3f} s."
+    return (
+        f"{worst}; {best.name}, by up to {micrometres(best.tool.max)} µm{_at(best.tool.line)} and "
+        f"{micrometres(best.tool.rms)} µm RMS, {100.0 * (1.0 - best.tool.rms / first.tool.rms):.0f} % less, "
+        f"{_time_price(best.cycle_time - first.cycle_time, first.cycle_time)}."
+    )
+
+
+def price_of_shaping(summary: Summary) -> str | None:
+    """What shaping pays in rounded corners, where a command is longer than the first row's."""
+    plain = summary.cases[0]
+    shaped = next((case for case in summary.cases if case.cycle_time > plain.cycle_time), None)
+    if shaped is None:
+        return None
+    lateness = (shaped.cycle_time - plain.cycle_time) * 1e3
+    before, after = worst_linear(plain.residual_vibration), worst_linear(shaped.residual_vibration)
+    return (
+        "A shaper mixes what lies before a corner with what lies behind it, so that the command itself "
+        f"rounds corners and flattens curves: {shaped.name}, it leaves the programmed path by up to "
+        f"{micrometres(shaped.command.max)} µm{_at(shaped.command.line)} and "
+        f"{micrometres(shaped.command.rms)} µm RMS, against {micrometres(plain.command.max)} and "
+        f"{micrometres(plain.command.rms)} µm {plain.name}, and ends {lateness:.1f} ms later. "
+        "That buys calm: the vibration left after the end goes from "
+        f"{micrometres(before)} to {micrometres(after)} µm."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place where a case's tool is far from the path."""
+
+    line: int
+    error: float  # mm, of the tool
+    drive_error: float  # mm, of the drives at the same time
+    first_error: float  # mm, the largest of the first case on this line, 0 where it has none
+    time: float  # s
+    foot: FloatArray  # (3,) mm, on the path
+
+
+def worst_places(run: Run, case: str) -> list[Place]:
+    """The worst places of a case, worst first, some time apart."""
+    signals, first = run.signal(case), run.signals[0]
+    apart = APART * float(np.ptp(signals.time)) if signals.time.size else 0.0
+    by_line = _worst_by_line(first)
+    left = signals.tool_error.copy()
+    places: list[Place] = []
+    while len(places) < WORST_PLACES and left.size and left.max() > 0.0:
+        row = int(left.argmax())
+        line = int(signals.line[row])
+        places.append(
+            Place(
+                line,
+                float(signals.tool_error[row]),
+                float(signals.drive_error[row]),
+                by_line.get(line, 0.0),
+                float(signals.time[row]),
+                signals.foot[row],
+            )
+        )
+        left[np.abs(signals.time - signals.time[row]) <= apart] = 0.0
+    return places
+
+
+def _worst_by_line(signals: Signals) -> dict[int, float]:
+    lines, index = np.unique(signals.line, return_inverse=True)
+    worst = np.zeros(lines.size)
+    np.maximum.at(worst, index, signals.tool_error)
+    return dict(zip(lines.tolist(), worst.tolist(), strict=True))
+
+
+def _at(line: int | None) -> str:
+    return "" if line is None else f" (line {line})"
+
+
+def _time_price(later: float, cycle_time: float) -> str:
+    if later < 5e-5:
+        return "in the same time" if later > -5e-5 else f"{-later * 1e3:.1f} ms sooner"
+    return f"for {later * 1e3:.1f} ms ({100.0 * later / cycle_time:.2g} %) more"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,149 @@
+"""Shaping: Trajectory to Trajectory, every axis through its own impulses, all axes delayed alike.
+
+Axes with unlike shapers would fall out of step and bend every path, so each axis is delayed to the
+largest centroid D of all: axis a's impulses sit at ``t_i + D - D_a``. On steady motion the shaped
+command is then the unshaped one, late by D, on all axes. Impulses fall between samples; they are not
+rounded to the grid but evaluated on the command's own cubic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from cnc_shape.arrays import FloatArray, IntArray, frozen
+from cnc_shape.kernels.taps import delayed_sum
+from cnc_shape.shapers.shaper import NONE, Shaper
+from cnc_shape.trajectory import Trajectory
+
+GRID_TOLERANCE = 1e-9  # -, of a sample: an impulse this close to the grid lies on it
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Delays:
+    """The impulses of all axes on the servo grid: delay ``(whole + share) * sample_time``."""
+
+    whole: IntArray  # (d,k) samples
+    share: FloatArray  # (d,k) of a sample, 0 <= share < 1
+    amplitude: FloatArray  # (d,k)
+    impulses: IntArray  # (d,) impulses of each axis
+    common: float  # s, D: how late the shaped command is
+    longest: float  # s, delay of the very last impulse
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ShapingState:
+    """The samples that later ones still hark back to."""
+
+    position: FloatArray  # (h,d)
+    velocity: FloatArray  # (h,d)
+    acceleration: FloatArray  # (h,d)
+    arc_length: FloatArray  # (h,)
+
+
+def common_delay(shapers: Mapping[str, Shaper]) -> float:
+    """Largest centroid of all shapers, s."""
+    return max((shaper.delay for shaper in shapers.values()), default=0.0)
+
+
+def delays(shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: float) -> Delays:
+    """Place the impulses of every axis on the servo grid; an axis without a shaper is only delayed."""
+    chosen = [shapers.get(axis, NONE) for axis in axes]
+    common = common_delay(shapers)
+    most = max(shaper.times.size for shaper in chosen)
+    whole = np.zeros((len(axes), most), dtype=np.int64)
+    share, amplitude = np.zeros((len(axes), most)), np.zeros((len(axes), most))
+    longest = 0.0
+    for row, shaper in enumerate(chosen):
+        times = shaper.times + (common - shaper.delay)
+        longest = max(longest, float(times[-1]))
+        samples = times / sample_time
+        nearest = np.rint(samples)
+        on_grid = np.abs(samples - nearest) <= GRID_TOLERANCE
+        k = times.size
+        whole[row, :k] = np.where(on_grid, nearest, np.floor(samples))
+        share[row, :k] = np.where(on_grid, 0.0, samples - np.floor(samples))
+        amplitude[row, :k] = shaper.amplitudes
+    return Delays(whole, share, amplitude, np.array([s.times.size for s in chosen]), common, longest)
+
+
+def shaping(
+    shapers: Mapping[str, Shaper], sample_time: float
+) -> Callable[[ShapingState | None, Trajectory, bool], tuple[ShapingState | None, Trajectory]]:
+    """Return the resumable stage that shapes the axis commands.
+
+    Before its first sample the command rests there; after its last it rests there for as long as the
+    last impulse needs.
+    """
+
+    def step(
+        state: ShapingState | None, command: Trajectory, last: bool
+    ) -> tuple[ShapingState | None, Trajectory]:
+        placed = delays(shapers, command.axes, sample_time)
+        history = int(placed.whole.max(initial=0)) + 2
+        if state is None:
+            if len(command) == 0:
+                return None, command
+            state = _rest(command.position[0], command.arc_length[0], history)
+        parts = [state, command]
+        if last:
+            end = command if len(command) else state
+            after = ceil(placed.longest / sample_time - GRID_TOLERANCE)
+            parts.append(_rest(end.position[-1], end.arc_length[-1], after))
+        position = np.concatenate([part.position for part in parts])
+        velocity = np.concatenate([part.velocity for part in parts])
+        acceleration = np.concatenate([part.acceleration for part in parts])
+        arc_length = np.concatenate([part.arc_length for part in parts])
+        first = state.position.shape[0]
+        count = position.shape[0] - first
+        shaped = delayed_sum(
+            position, velocity, acceleration, first, count,
+            placed.whole, placed.share, placed.amplitude, placed.impulses, sample_time,
+        )  # fmt: skip
+        kept = slice(position.shape[0] - history, None)
+        return (
+            ShapingState(position[kept], velocity[kept], acceleration[kept], arc_length[kept]),
+            Trajectory(
+                command.axes,
+                sample_time,
+                frozen(_late(arc_length, first, placed.common / sample_time)),
+                *(frozen(signal) for signal in shaped),
+            ),
+        )
+
+    return step
+
+
+def shape(command: Trajectory, shapers: Mapping[str, Shaper]) -> Trajectory:
+    """Shape a whole motion.
+
+    Parameters
+    ----------
+    command
+        The axis commands from rest to rest.
+    shapers
+        One shaper per axis name; an axis without one is only delayed.
+
+    Returns
+    -------
+    Trajectory
+        Starts at t = 0 where `command` starts, ends where it ends, later by the last impulse.
+    """
+    return shaping(shapers, command.sample_time)(None, command, True)[1]
+
+
+def _rest(position: FloatArray, arc_length: float, samples: int) -> ShapingState:
+    still = np.zeros((samples, position.size))
+    return ShapingState(still + position, still, still, np.full(samples, arc_length))
+
+
+def _late(values: FloatArray, first: int, delay: float) -> FloatArray:
+    """`values` from row `first` on, `delay` samples ago, linear between samples."""
+    whole = int(np.floor(delay))
+    share = delay - whole
+    right = values[first - whole : values.size - whole]
+    left = values[first - whole - 1 : values.size - whole - 1]
+    return right + share * (left - right)

@@ -1,0 +1,28 @@
+"""Names and program lines that want to be code."""
+
+PAYLOADS = (
+    "<script>document.title='owned'</script>",
+    "</title><script>document.title='owned'</script>",
+    "</style><script>document.title='owned'</script>",
+    "</pre></details><script>document.title='owned'</script>",
+    "--><script>document.title='owned'</script>",
+    "]]><script>document.title='owned'</script>",
+    "\"><img src=x onerror=document.title='owned'>",
+    "'><img src=x onerror=document.title='owned'>",
+    "<img src=https://example.invalid/x.png>",
+    "<svg onload=document.title='owned'>",
+    "<svg><script>document.title='owned'</script></svg>",
+    "<iframe srcdoc='<script>parent.document.title=1</script>'></iframe>",
+    "<a href=javascript:document.title='owned'>x</a>",
+    "<body onload=document.title='owned'>",
+    "<style>*{display:none}</style>",
+    "<link rel=stylesheet href=https://example.invalid/x.css>",
+    "<meta http-equiv=refresh content='0;url=https://example.invalid/'>",
+    "<base href=https://example.invalid/>",
+    "<form action=https://example.invalid/><button>x</button></form>",
+    "{{ 7*7 }}{% include '/etc/passwd' %}",
+    "&lt;script&gt;document.title='owned'&lt;/script&gt;",
+    "\u202e<script>document.title='owned'</script>",
+    "\udcff\x00\x1b]0;owned\x07<script>document.title='owned'</script>",
+    "+ADw-script+AD4-document.title='owned'+ADw-/script+AD4-",
+)

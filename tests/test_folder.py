@@ -1,0 +1,162 @@
+"""The run folder: complete, the same to the byte each time, and free of numbers that are none."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from runs import MODE, PROGRAM, TEXT, make_run, shaper
+
+from cnc_shape.arrays import frozen
+from cnc_shape.errors import InfeasibleError, OutputError
+from cnc_shape.report.folder import RUNS, Context, default_folder, write_report
+from cnc_shape.report.table import summary_json
+
+RUN = make_run(600)
+CONTEXT = Context(
+    command=("simulate", PROGRAM),
+    inputs={PROGRAM: hashlib.sha256(TEXT).hexdigest()},
+    machine="name: XY stage\n",
+    shapers={"x": shaper()},
+    modes={"x": (MODE,)},
+    warnings=("part.nc:3: warning: µ",),
+)
+FILES = {
+    "report.html", "results.json", "signals.npz", "tables.csv", "machine.yaml", "run.json", "figures/path.svg",
+    "figures/error.svg", "figures/motion.svg", "figures/vibration.svg", "figures/shapers.svg",
+}  # fmt: skip
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("out") / "run"
+    assert write_report(RUN, folder, CONTEXT) == folder / "report.html"
+    return folder
+
+
+def test_the_folder_holds_what_it_promises(written):
+    assert set(content(written)) == FILES
+    assert [path.name for path in written.parent.iterdir()] == ["run"]
+    assert (written / "machine.yaml").read_text() == "name: XY stage\n"
+
+
+def test_a_run_written_again_is_the_same_to_the_byte(written, tmp_path, monkeypatch):
+    monkeypatch.setattr("time.time", lambda: 2e9)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1")
+    monkeypatch.chdir(tmp_path)
+    write_report(RUN, "other", CONTEXT)
+    assert content(tmp_path / "other") == content(written)
+
+
+def test_results_are_the_json_of_the_command(written):
+    assert json.loads((written / "results.json").read_bytes()) == summary_json(RUN.summary)
+    with (written / "tables.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row, case in zip(rows, summary_json(RUN.summary)["cases"], strict=True):
+        assert float(row["tool_contour_rms_um"]) == case["tool_contour_rms_um"]
+
+
+def test_signals_hold_every_sample_time_first_with_units(written):
+    with np.load(written / "signals.npz") as signals:
+        assert signals.files[0] == "unshaped/time_s"
+        for case in RUN.signals:
+            assert_array_equal(signals[f"{case.case}/time_s"], case.time)
+            assert_array_equal(signals[f"{case.case}/tool_y_mm"], case.tool[:, 1])
+            assert_array_equal(signals[f"{case.case}/acceleration_x_mm_s2"], case.acceleration[:, 0])
+            assert_array_equal(signals[f"{case.case}/tool_contour_error_mm"], case.tool_error)
+            assert_array_equal(signals[f"{case.case}/line"], case.line)
+
+
+def test_run_json_names_inputs_versions_and_command(written):
+    run = json.loads((written / "run.json").read_bytes())
+    assert run["schema"] == "cnc-shape/run/1"
+    assert run["command"] == ["simulate", PROGRAM]
+    assert run["inputs"] == {PROGRAM: hashlib.sha256(TEXT).hexdigest()}
+    assert run["machine_sha256"] == hashlib.sha256(b"name: XY stage\n").hexdigest()
+    assert run["versions"]["numpy"] == np.__version__
+
+
+def test_the_default_folder_goes_with_what_was_run(tmp_path, monkeypatch):
+    folder = default_folder(RUN, CONTEXT)
+    assert folder == default_folder(RUN, CONTEXT)
+    assert folder.parent == Path(RUNS)
+    assert folder.name.startswith("corner_and_arc-")
+    assert len({folder, default_folder(RUN, replace(CONTEXT, machine="name: other\n"))}) == 2
+    monkeypatch.chdir(tmp_path)
+    write_report(RUN, folder, CONTEXT)
+    write_report(RUN, folder, CONTEXT)  # its name says what it holds: it may take its own place
+    assert set(content(folder)) == FILES
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd", "..", "a/b", "-rf", "x" * 500, "", "\udcff\n", "CON"])
+def test_the_default_folder_stays_in_its_place(name):
+    folder = default_folder(replace(RUN, summary=replace(RUN.summary, program=name)), CONTEXT)
+    assert folder.parent == Path(RUNS)
+    assert not folder.name.startswith((".", "-"))
+    assert len(folder.name) < 100
+
+
+def test_an_older_folder_needs_force(written):
+    with pytest.raises(OutputError, match="exists"):
+        write_report(RUN, written, CONTEXT)
+    before = content(written)
+    write_report(RUN, written, CONTEXT, force=True)
+    assert content(written) == before
+
+
+@pytest.mark.parametrize("name", ["tool", "velocity", "drive_error", "time", "foot"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_signal_that_is_not_finite_is_named_with_its_time_and_nothing_is_written(tmp_path, name, value):
+    shaped = RUN.signal("shaped")
+    values = getattr(shaped, name).copy()
+    values[100] = value
+    bad = replace(shaped, **{name: frozen(values)})
+    with pytest.raises(InfeasibleError, match=rf"{name}.* of the case shaped is {value} at t = "):
+        write_report(replace(RUN, signals=(RUN.signals[0], bad, RUN.signals[2])), tmp_path / "run", CONTEXT)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("call", [1, 5, 12])
+def test_a_fault_leaves_nothing(tmp_path, monkeypatch, call):
+    original, calls = os.fsync, []
+
+    def faulty(descriptor):
+        calls.append(descriptor)
+        if len(calls) == call:
+            raise OSError(5, "Input/output error")
+        original(descriptor)
+
+    monkeypatch.setattr(os, "fsync", faulty)
+    with pytest.raises(OutputError, match="input/output"):
+        write_report(RUN, tmp_path / "run", CONTEXT)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_are_no_text_are_spelled_out(tmp_path):
+    odd = "part\udcff.nc"
+    run = replace(RUN, summary=replace(RUN.summary, program=odd))
+    write_report(run, tmp_path / "run", replace(CONTEXT, inputs={odd: "00"}, command=("simulate", odd)))
+    assert json.loads((tmp_path / "run" / "results.json").read_bytes())["program"] == odd
+    assert b"part\\udcff.nc" in (tmp_path / "run" / "report.html").read_bytes()
+
+
+def test_figures_come_in_the_format_asked_for(tmp_path):
+    write_report(RUN, tmp_path / "run", replace(CONTEXT, figure_format="png"))
+    assert {p.suffix for p in (tmp_path / "run" / "figures").iterdir()} == {".png"}
+    assert b"data:image/svg+xml" in (tmp_path / "run" / "report.html").read_bytes()
+
+
+def test_a_run_without_signals_is_our_own_bug(tmp_path):
+    with pytest.raises(ValueError, match="signals"):
+        write_report(replace(RUN, signals=()), tmp_path / "run", CONTEXT)

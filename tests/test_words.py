@@ -1,0 +1,83 @@
+"""A run in words: the sentence holds the numbers of the table, and says better or worse as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from runs import make_run
+
+from cnc_shape.pipeline import CaseSummary, Deviation, Summary
+from cnc_shape.report.words import price_of_shaping, verdict, worst_places
+
+RUN = make_run(2000)
+
+
+def case(name: str, rms: float, largest: float, cycle_time: float, command: float = 0.0) -> CaseSummary:
+    tool, told = Deviation(rms, largest, 7), Deviation(command / 2, command, 9)
+    return CaseSummary(name, cycle_time, told, tool, tool, {"x": 0.0}, {"x": rms, "a": 1e9})
+
+
+def summary(*cases: CaseSummary) -> Summary:
+    return Summary("part.nc", "stage", cases[0].cycle_time, 1e-3, 100, cases)
+
+
+def test_the_verdict_names_what_was_what_is_and_the_price_in_time():
+    text = verdict(summary(case("unshaped", 0.04, 0.1, 10.0), case("shaped", 0.01, 0.02, 10.05)))
+    assert text == (
+        "Unshaped, the tool leaves the programmed path by up to 100 µm (line 7) and 40.0 µm RMS; shaped, by up to "
+        "20.0 µm (line 7) and 10.0 µm RMS, 75 % less, for 50.0 ms (0.5 %) more."
+    )
+
+
+def test_where_shaping_does_not_help_the_verdict_says_so():
+    text = verdict(summary(case("unshaped", 0.01, 0.02, 10.0), case("shaped", 0.04, 0.1, 10.05)))
+    assert "no other case does better" in text
+    assert "less" not in text
+
+
+def test_one_case_has_no_rival():
+    text = verdict(summary(case("independent", 0.01, 0.02, 10.0)))
+    assert text.endswith("; the program takes 10.000 s.")
+    assert price_of_shaping(summary(case("independent", 0.01, 0.02, 10.0))) is None
+
+
+def test_a_machine_without_error_is_no_division_by_zero():
+    assert "0.00 µm" in verdict(summary(case("a", 0.0, 0.0, 1.0), case("b", 0.0, 0.0, 1.0)))
+
+
+def test_the_price_is_the_command_s_own_error_and_the_gain_is_calm():
+    text = price_of_shaping(
+        summary(
+            case("unshaped", 0.04, 0.1, 10.0), case("shaped-feedforward", 0.001, 0.02, 10.05, command=0.03)
+        )
+    )
+    assert (
+        "shaped-feedforward, it leaves the programmed path by up to 30.0 µm (line 9) and 15.0 µm RMS" in text
+    )
+    assert "ends 50.0 ms later" in text
+    assert "from 40.0 to 1.00 µm" in text  # the rotary axis is no length
+
+
+def test_the_worst_places_start_with_the_worst_and_lie_apart():
+    for name in ("unshaped", "shaped"):
+        signals = RUN.signal(name)
+        places = worst_places(RUN, name)
+        assert len(places) == 10
+        worst = int(signals.tool_error.argmax())
+        assert (places[0].error, places[0].line) == (signals.tool_error[worst], signals.line[worst])
+        errors = [place.error for place in places]
+        assert errors == sorted(errors, reverse=True)
+        times = np.sort([place.time for place in places])
+        assert np.diff(times).min() > 0.02 * np.ptp(signals.time)
+
+
+def test_a_place_tells_what_the_first_case_did_on_its_line():
+    first = RUN.signals[0]
+    for place in worst_places(RUN, "shaped"):
+        assert place.first_error == first.tool_error[first.line == place.line].max()
+
+
+def test_a_perfect_case_has_no_worst_place():
+    calm = tuple(replace(s, tool_error=0.0 * s.tool_error) for s in RUN.signals)
+    assert worst_places(replace(RUN, signals=calm), "shaped") == []
