@@ -158,13 +158,11 @@ def _advance(
 ) -> tuple[Path, Polyline, int, int]:
     """Cells of all edges from `done` on that nothing to come can change; and the edges to keep."""
     ticks, tangent = edges(line.start, line.end, line.alone)
-    u = np.concatenate([[0], np.cumsum(ticks)[:-1]])
+    u: IntArray = np.cumsum(ticks) - ticks
     turn, twist = turns(tangent, line.stop)
     width = widths(u, line.tolerance, turn, twist, line.stop)
     stops = np.flatnonzero(line.stop)
-    longest = min(
-        LONGEST_BLEND, LONGEST_BLEND_RATIO * float(line.tolerance[np.isfinite(line.tolerance)].max())
-    )
+    longest = min(LONGEST_BLEND, LONGEST_BLEND_RATIO * float(line.tolerance.max()))
     reach = int((LONGEST_BLEND + (4 * ROUNDS + 8) * longest) / TICK)
     finish = len(line)
     if not last:
@@ -175,11 +173,11 @@ def _advance(
         places = np.vstack([places, [[len(line) - 1, 0, 0]]])
         rows = np.concatenate([rows, np.zeros((1, *rows.shape[1:]))])
         rows[-1, 0] = line.start[-1]
-    edge, offset, length = places.T
+    edge, offset, length = (frozen_integers(column) for column in places.T)
 
-    anchor = np.maximum.accumulate(np.where(line.stop == 1, u, -origin))  # where u is zero
-    first = offset == 0
-    travelled = np.where(line.alone == 1, 0.0, line.travel)
+    anchor: IntArray = np.maximum.accumulate(np.where(line.stop == 1, u, -origin))  # where u is zero
+    first: BoolArray = offset == 0
+    travelled: FloatArray = np.where(line.alone == 1, 0.0, line.travel)
     stretch = travelled / (np.maximum(ticks, 1) * TICK)
     path = Path(
         axes=axes,
@@ -195,12 +193,8 @@ def _advance(
     )
     if finish == len(line):
         return path, line, finish, 0
-    stop = (
-        int(stops[np.searchsorted(stops, finish, side="right") - 1])
-        if stops.size and stops[0] <= finish
-        else 0
-    )
-    keep = max(stop, int(np.searchsorted(u, u[finish] - reach)) - 2, 0)
+    passed: IntArray = stops[stops <= finish]
+    keep = max(int(passed[-1]) if passed.size else 0, int(np.searchsorted(u, u[finish] - reach)) - 2)
     return path, line.cut(slice(keep, None)), finish - keep, int(u[keep] - anchor[keep])
 
 

@@ -73,7 +73,10 @@ def turns(tangent, stop):
 
 @kernel
 def lipschitz(u, width):
-    """Limit the widths, in ticks: neighbours differ by at most half their distance, so supports stay in order."""
+    """Let neighbouring widths, in ticks, differ by half their distance at most.
+
+    So the supports begin and end in the order of their vertices.
+    """
     n = width.size
     for k in range(1, n):
         width[k] = min(width[k], width[k - 1] + ((u[k] - u[k - 1]) >> 1))
@@ -192,24 +195,16 @@ def widths(u, tolerance, turn, twist, stop):
 
 
 @kernel
-def grown(array):
-    """Return `array` with room for twice as many rows."""
-    larger = np.empty((2 * array.shape[0], array.shape[1]))
-    larger[: array.shape[0]] = array
-    return larger
-
-
-@kernel
 def sum_hats(at, center, half, step, low, high, sums):
     """Add to the powers `sums` (4,d) at `at` the hats `low` to `high`, which all reach beyond it."""
     for j in range(low, high):
-        l = half[j] * TICK
+        wide = half[j] * TICK
         side = -1.0 if center[j] <= at else 1.0
         y = 1.0 - abs(at - center[j]) / half[j]
-        zeroth = l * y * y * y / 6.0
+        zeroth = wide * y * y * y / 6.0
         first = side * y * y * 0.5
-        second = y * 0.5 / l
-        third = side / (6.0 * l * l)
+        second = y * 0.5 / wide
+        third = side / (6.0 * wide * wide)
         for i in range(sums.shape[1]):
             sums[0, i] += step[j, i] * zeroth
             sums[1, i] += step[j, i] * first

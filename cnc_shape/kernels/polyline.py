@@ -20,6 +20,7 @@ COS_EXACT_CORNER = 0.9998476951563913  # cos 1 degree: a sharper corner of an ex
 ROTARY_MERGE_TOLERANCE = 1e-4  # rad
 WINDOW = 64  # edges that one chord may replace
 FEW = 4  # edges: a chord that replaces fewer is worth a look for noise
+LARGEST_SPIRAL = 0.01  # -, change of the radius of an arc that still gets a polygon about it
 MANY = 8  # edges: fewer are not a pattern
 NOISE_TURN = 0.1  # -, net turn over the sum of turns, of a run that is noise
 
@@ -46,32 +47,68 @@ def arc_radii(start, end, center, normal, r):
 
 
 @kernel
-def arc_edges(radius_start, radius_end, rise, sweep, tolerance):
-    """Vertices of the polygon about an arc of `sweep` rad, and its largest distance from the arc, mm.
+def arc_edges(inner, outer, rise, sweep, tolerance):
+    """Return how an arc of `sweep` rad is cut: steps of angle, 1 if about it, and the distance from it, mm.
 
-    The polygon touches the arc in the middle of every edge; its corners lie outside by
-    ``r (1/cos(phi/2) - 1)``. Where the radius or the height changes with the angle (spiral, helix), the
-    straight edge also misses the curve by a third-order term in z and r, and a second-order one in r.
+    A polygon about the arc touches it in the middle of every edge; its corners lie outside by
+    ``r (1/cos(phi/2) - 1)``. Where the radius or the height changes with the angle, its straight edge also
+    misses the curve by a third-order term in z and r, and a second-order one in r. A spiral whose radius
+    changes by more than a little gets chords instead: off by ``phi^2/8`` of its second derivative by angle.
     """
     unit = ARC_SHARE * tolerance
     angle = abs(sweep)
-    largest = max(radius_start, radius_end)
-    smallest = max(min(radius_start, radius_end), 0.01 * largest)
+    largest = max(inner, outer)
     climb = abs(rise) / angle
-    spiral = abs(radius_end - radius_start) / angle
+    spiral = abs(outer - inner) / angle
+    if abs(outer - inner) > LARGEST_SPIRAL * largest:
+        bend = largest + 2.0 * spiral
+        count = max(1, int(np.ceil(angle / min(LARGEST_STEP, np.sqrt(24.0 * unit / bend)))))
+        return count, 0, (angle / count) ** 2 / 8.0 * bend
     step = min(LARGEST_STEP, np.sqrt(24.0 * unit / largest))
     if climb + spiral > 0.0:
         step = min(step, (10.0 * unit / (climb + spiral)) ** (1.0 / 3.0))
     if spiral > 0.0:
-        step = min(step, np.sqrt(unit * smallest) / spiral)
+        step = min(step, np.sqrt(unit * largest) / spiral)
     count = max(1, int(np.ceil(angle / step)))
     step = angle / count
     distance = (
         largest * (1.0 / np.cos(0.5 * step) - 1.0)
         + 0.02 * (climb + spiral) * step**3
-        + 0.5 * (spiral * step) ** 2 / smallest
+        + (spiral * step) ** 2 / largest
     )
-    return count, distance
+    return count, 1, distance
+
+
+@kernel
+def arc_arm(start, end, center, normal, sweep, r, inner, outer, rise, arm):
+    """Unit vector `arm` (3,) from the axis of the arc in row `r` to its start.
+
+    Where it starts on the axis: the direction it leaves in, its end turned back.
+    """
+    if inner > 1e-12 * outer:
+        for i in range(3):
+            arm[i] = (start[r, i] - center[r, i]) / inner
+        return
+    c = np.cos(sweep[r])
+    s = np.sin(sweep[r])
+    for i in range(3):
+        j = (i + 1) % 3
+        m = (i + 2) % 3
+        along = end[r, i] - center[r, i] - rise * normal[r, i]
+        ej = end[r, j] - center[r, j] - rise * normal[r, j]
+        em = end[r, m] - center[r, m] - rise * normal[r, m]
+        arm[i] = (c * along - s * (normal[r, j] * em - normal[r, m] * ej)) / outer
+
+
+@kernel
+def arc_length_between(inner, outer, rise, angle, low, high):
+    """Length of an arc between two shares of its angle, by Simpson's rule; exact for circles and helices."""
+    total = 0.0
+    for n in range(3):
+        radius = inner + (outer - inner) * (low + 0.5 * n * (high - low))
+        speed = np.sqrt((radius * angle) ** 2 + (outer - inner) ** 2 + rise * rise)
+        total += speed * (4.0 if n == 1 else 1.0) / 6.0
+    return total * (high - low)
 
 
 @kernel
@@ -103,11 +140,12 @@ def polygonize(
     values (6,n)
         Place and travel on the toolpath, tolerance, what of it the polygon uses, mm; feed rate; dwell.
     marks (4,n)
-        Line, stop, rotary-only, and the toolpath's row (``-1 - row`` for edges of an arc).
+        Line, stop, rotary-only, and the toolpath's row, counted from 1; negative for an arc.
     """
     rows, d = start.shape
     total = 0
     counts = np.zeros(rows, np.int64)
+    about = np.zeros(rows, np.int64)
     budgets = np.empty(rows)
     spents = np.zeros(rows)
     for r in range(rows):
@@ -119,8 +157,8 @@ def polygonize(
         counts[r] = 1
         if kind[r] == ARC:
             inner, outer, rise = arc_radii(start, end, center, normal, r)
-            count, spents[r] = arc_edges(inner, outer, rise, sweep[r], budgets[r])
-            counts[r] = count + 1
+            count, about[r], spents[r] = arc_edges(inner, outer, rise, sweep[r], budgets[r])
+            counts[r] = count + about[r]
         total += counts[r]
 
     o_start = np.empty((total, d))
@@ -130,6 +168,7 @@ def polygonize(
     n = 0
     direction = np.empty(d)
     point = np.empty((1, d))
+    arm = np.empty(3)
     for r in range(rows):
         if kind[r] == DWELL:
             flags[4] = 1
@@ -139,35 +178,43 @@ def polygonize(
         travel = arc_length[r + 1] - arc_length[r]
         alone = False
         if kind[r] == ARC:
-            count = counts[r] - 1
             inner, outer, rise = arc_radii(start, end, center, normal, r)
-            lift = 1.0 / np.cos(0.5 * sweep[r] / count)
+            arc_arm(start, end, center, normal, sweep, r, inner, outer, rise, arm)
+            count = counts[r] - about[r]
+            shift = 0.5 if about[r] == 1 else 1.0
+            lift = 1.0 / np.cos(0.5 * sweep[r] / count) if about[r] == 1 else 1.0
+            length = 0.0
+            for k in range(counts[r]):
+                low = max(0.0, (k - 1.0 + shift) / count)
+                length += arc_length_between(inner, outer, rise, sweep[r], low, min(1.0, (k + shift) / count))
+            scale = travel / length
+            place = arc_length[r]
             copy_point(start, r, o_start, n)
-            o_values[0, n] = arc_length[r]
-            for k in range(count):
-                share = (k + 0.5) / count
-                angle = sweep[r] * share
-                scale = (inner + (outer - inner) * share) / inner * lift
-                c = scale * np.cos(angle)
-                s = scale * np.sin(angle)
+            for k in range(counts[r]):
+                share = min(1.0, (k + shift) / count)
+                low = max(0.0, (k - 1.0 + shift) / count)
+                along = scale * arc_length_between(inner, outer, rise, sweep[r], low, share)
+                o_values[0, n] = place
+                o_values[1, n] = along
+                place += along
+                if k == counts[r] - 1:
+                    copy_point(end, r, o_end, n)
+                    o_values[1, n] = arc_length[r + 1] - o_values[0, n]
+                    n += 1
+                    break
+                radius = (inner + (outer - inner) * share) * lift
+                c = radius * np.cos(sweep[r] * share)
+                s = radius * np.sin(sweep[r] * share)
                 for i in range(3):
                     j = (i + 1) % 3
                     m = (i + 2) % 3
-                    arm = start[r, i] - center[r, i]
-                    side = normal[r, j] * (start[r, m] - center[r, m]) - normal[r, m] * (
-                        start[r, j] - center[r, j]
-                    )
-                    point[0, i] = center[r, i] + c * arm + s * side + rise * share * normal[r, i]
+                    side = normal[r, j] * arm[m] - normal[r, m] * arm[j]
+                    point[0, i] = center[r, i] + c * arm[i] + s * side + rise * share * normal[r, i]
                 for i in range(3, d):
-                    point[0, i] = start[r, i] + (end[r, i] - start[r, i]) * share
+                    point[0, i] = start[r, i] + (end[r, i] - start[r, i]) * (place - arc_length[r]) / travel
                 copy_point(point, 0, o_end, n)
-                o_values[1, n] = travel * (0.5 if k == 0 else 1.0) / count
                 n += 1
                 copy_point(point, 0, o_start, n)
-                o_values[0, n] = arc_length[r] + travel * share
-            copy_point(end, r, o_end, n)
-            o_values[1, n] = travel * 0.5 / count
-            n += 1
         else:
             copy_point(start, r, o_start, n)
             copy_point(end, r, o_end, n)
@@ -189,7 +236,7 @@ def polygonize(
             o_values[5, k] = 0.0
             o_marks[0, k] = line[r]
             o_marks[2, k] = 1 if alone else 0
-            o_marks[3, k] = r if kind[r] != ARC else -1 - r
+            o_marks[3, k] = 1 + r if kind[r] != ARC else -1 - r
 
         exact = mode[r] != BLEND or tolerance[r] <= 0.0
         cosine = 0.0
