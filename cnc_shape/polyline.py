@@ -13,7 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels.polyline import merge, polygonize
+from cnc_shape.kernels.chords import merge
+from cnc_shape.kernels.polyline import polygonize
 from cnc_shape.toolpath import Toolpath
 
 LARGEST_MERGE_SHARE = 0.5  # -, of the path tolerance: merging leaves the corners their half

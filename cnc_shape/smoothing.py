@@ -16,16 +16,8 @@ import numpy as np
 
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import OptionError
-from cnc_shape.kernels.hats import (
-    LONGEST_BLEND,
-    LONGEST_BLEND_RATIO,
-    ROUNDS,
-    TICK,
-    cells,
-    edges,
-    turns,
-    widths,
-)
+from cnc_shape.kernels.cells import cells
+from cnc_shape.kernels.hats import LONGEST_BLEND, LONGEST_BLEND_RATIO, ROUNDS, TICK, edges, turns, widths
 from cnc_shape.polyline import Merging, Polyline, PolylineState, join, polyline
 from cnc_shape.toolpath import Toolpath
 
@@ -166,7 +158,7 @@ def _advance(
     reach = int((LONGEST_BLEND + (4 * ROUNDS + 8) * longest) / TICK)
     finish = len(line)
     if not last:
-        settled = int(np.searchsorted(u, u[-1] - reach, side="right")) - 1
+        settled = int((u <= u[-1] - reach).sum()) - 1
         finish = max(done, settled, int(stops[-1]) if stops.size else 0)
     places, rows = cells(line.start, u, ticks, tangent, turn, twist, width, done, finish)
     if last:  # the edge without length at the end of the program is a cell as well
@@ -194,7 +186,7 @@ def _advance(
     if finish == len(line):
         return path, line, finish, 0
     passed: IntArray = stops[stops <= finish]
-    keep = max(int(passed[-1]) if passed.size else 0, int(np.searchsorted(u, u[finish] - reach)) - 2)
+    keep = max(int(passed[-1]) if passed.size else 0, int((u < u[finish] - reach).sum()) - 2)
     return path, line.cut(slice(keep, None)), finish - keep, int(u[keep] - anchor[keep])
 
 
