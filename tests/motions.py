@@ -116,6 +116,31 @@ def gaps(path: Path):
     return jumps[0].max(initial=0.0), jumps[1][through].max(initial=0.0), jumps[2][through].max(initial=0.0)
 
 
+def refined(path: Path, parts: int) -> Path:
+    """The same path with every cell but the rests cut into equal ones."""
+    count = np.where(path.length > 0.0, parts, 1)
+    k = np.repeat(np.arange(len(path)), count)
+    share = np.concatenate([np.arange(n) / n for n in count])
+    e, c = (share * path.length[k])[:, None], path.coefficients[k]
+    coefficients = np.stack(
+        [
+            c[:, 0] + e * (c[:, 1] + e * (c[:, 2] + e * c[:, 3])),
+            c[:, 1] + e * (2 * c[:, 2] + 3 * e * c[:, 3]),
+            c[:, 2] + 3 * e * c[:, 3],
+            c[:, 3],
+        ],
+        axis=1,
+    )
+    stop = path.stop[k] & (share == 0.0)
+    stop.setflags(write=False)
+    return Path(
+        path.axes, frozen(path.u[k] + e[:, 0]), frozen(path.length[k] / count[k]), frozen(coefficients),
+        frozen(path.feed_rate[k]), stop, frozen(np.where(stop, path.dwell[k], 0.0)),
+        frozen(path.arc_length[k] + path.stretch[k] * e[:, 0]), frozen(path.stretch[k]),
+        frozen_integers(path.line[k]),
+    )  # fmt: skip
+
+
 def wander(rng: np.random.Generator, n: int) -> Toolpath:
     """A random program: dense curves, tiny and long moves, corners, feeds, exact stops, dwells."""
     turn = rng.normal(size=n) * np.where(rng.random(n) < 0.9, 0.02, 1.5)

@@ -186,7 +186,7 @@ def chords(points, tolerance, window):
 
 
 def hat_sums(u, width, size):
-    """S at every vertex: the sum over all hats of ``size l (1 - |x|)^3 / 6``; and how many others reach it."""
+    """Sum over all hats of ``size l (1 - |x|)^3 / 6`` at every vertex; and how many others reach it."""
     x = np.abs(u[:, None] - u[None, :]) / np.where(width > 0.0, width, 1.0)
     reaches = (x < 1.0) & (width > 0.0) & (size > 0.0)
     terms = np.where(reaches, size * width * (1.0 - np.minimum(x, 1.0)) ** 3 / 6.0, 0.0)
@@ -242,11 +242,11 @@ def cell_rows(coefficients, h):
 
 
 def fastest(path, limit_v2, acceleration):
-    """Squared speeds at the nodes by linear programs, one a cell: backward from rest, then forward from rest."""
+    """Squared speeds at the nodes by linear programs, one a cell: backward, then forward, from rest."""
     from scipy.optimize import linprog
 
     n = len(path)
-    cap = np.minimum(np.append(limit_v2, 0.0), np.concatenate([[0.0], limit_v2]))
+    cap = np.minimum(np.append(limit_v2[:, 0], 0.0), np.concatenate([[0.0], limit_v2[:, 1]]))
     cap[:n][path.stop] = 0.0
     cap[n] = 0.0
 

@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, toolpath
 
 import cnc_shape.smoothing
-from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.errors import OptionError
 from cnc_shape.kernels.hats import ROUNDS, SHRINK, TICK, edges, first_widths, turns, widths
 from cnc_shape.polyline import Merging, polyline
@@ -53,11 +52,8 @@ def random_program(rng, tolerance, n=40):
         sweep = rng.choice([-1, 1]) * rng.choice([0.1, 1.5, 7.0])
         center = at - size * np.array([np.cos(heading), np.sin(heading), 0.0])
         out = size * (1 + rng.choice([0.0, 0.003, 0.5]))
-        end = center + [
-            out * np.cos(heading + sweep),
-            out * np.sin(heading + sweep),
-            rng.choice([0.0, 0.2 * size]),
-        ]
+        around = np.array([np.cos(heading + sweep), np.sin(heading + sweep), 0.0])
+        end = center + out * around + np.array([0.0, 0.0, rng.choice([0.0, 0.2 * size])])
         moves.append(arc(tuple(end), tuple(center), sweep, tolerance=tolerance))
         at = np.asarray(end)
     return toolpath(*moves)

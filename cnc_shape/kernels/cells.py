@@ -6,7 +6,7 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.hats import TICK
 
-LARGEST_TURN = 0.15  # rad of turn in a cell
+LARGEST_TURN = 0.1  # rad of turn in a cell
 MOST_CELLS = 8  # in a span between two knots
 
 
