@@ -41,7 +41,7 @@ def render(figure: Figure, kind: Format) -> bytes:
 
     content = io.BytesIO()
     with mpl.rc_context(RC):
-        figure.savefig(content, format=kind, metadata=METADATA[kind], dpi=160, bbox_inches="tight")
+        figure.savefig(content, format=kind, metadata=METADATA[kind], dpi=160)
     return content.getvalue()
 
 
@@ -151,12 +151,19 @@ def path_figure(run: Run) -> Figure:
             ax.tick_params(labelbottom=True)
         if k % columns == 0:
             ax.set_ylabel(f"{'XYZ'[j]} (mm)")
-        handles = [programmed[0], tool[0], circle[0]]
+        handles = [programmed[0], *_neutral(tool), circle[0]]
     for ax in axes[count:]:
         ax.set_visible(False)
     labels = ["programmed path", f"tool, contour error × {factor:g}", "worst place"]  # noqa: RUF001
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
+
+
+def _neutral(lines: Sequence[Line2D]) -> list[Line2D]:
+    """A line for the legend that stands for lines of every colour."""
+    from matplotlib.lines import Line2D
+
+    return [Line2D([], [], color="black", linewidth=line.get_linewidth()) for line in lines]
 
 
 @_styled

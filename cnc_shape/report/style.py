@@ -22,6 +22,8 @@ RC: Any = {
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
+    "figure.constrained_layout.h_pad": 0.08,  # inch
+    "figure.constrained_layout.w_pad": 0.06,  # inch
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.0,
