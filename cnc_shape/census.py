@@ -53,6 +53,12 @@ def count(state: Census | None, program: Program) -> Census:
     feeds = (kinds == Motion.FEED) | (kinds == Motion.ARC)
     low, high = extent(program)
     moves = kinds != Motion.DWELL
+    at_first = np.flatnonzero(moves)[:1]
+    if state.low[0] > state.high[0] and at_first.size and kinds[at_first[0]] != Motion.RAPID:
+        here = program.start[
+            :3
+        ]  # a path that begins with a feed begins here; a first rapid may come from anywhere
+        state = replace(state, low=here, high=here)
     return replace(
         state,
         rapids=state.rapids + int(np.count_nonzero(kinds == Motion.RAPID)),

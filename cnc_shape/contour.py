@@ -18,10 +18,12 @@ from math import sqrt
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels.foot_point import feet, group_boxes, points_at
+from cnc_shape.kernels.foot_point import feet, pack, points_at, stack_boxes
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.segments import NO_SEGMENTS, Segments, join, segments, since
 from cnc_shape.toolpath import Toolpath
+
+BACKTRACK = 0.1  # mm of path kept for commands that run backwards by rounding, or between samples
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,7 +86,7 @@ def foot_windows(
     Parameters
     ----------
     arc_length
-        (n,) mm, place of each sample's command on the toolpath, not decreasing.
+        (n,) mm, place of each sample's command on the toolpath; it never runs back by more than `BACKTRACK`.
     back, ahead
         Samples.
     margin
@@ -117,30 +119,32 @@ def contour_error(
     """
     if not lower.shape == upper.shape == position.shape[:1]:
         raise ValueError(f"{position.shape=} {lower.shape=} {upper.shape=}")
-    return _measure(position, segments(toolpath, first=True), frozen(lower), frozen(upper))
+    (error,) = _measure((position,), segments(toolpath, first=True), frozen(lower), frozen(upper))
+    return error
 
 
-def _measure(position: FloatArray, path: Segments, lower: FloatArray, upper: FloatArray) -> ContourError:
+def _measure(
+    signals: Sequence[FloatArray], path: Segments, lower: FloatArray, upper: FloatArray
+) -> tuple[ContourError, ...]:
+    """Contour error of every signal, (n, >= 3) mm each, in the same windows."""
     if path.low.size == 0:
         raise ValueError("a contour error needs a path")
-    points = frozen(position[:, :3])
-    groups = frozen(group_boxes(path.boxes))
-    distance, place, segment, _ = feet(
-        points,
-        lower,
-        upper,
-        path.start,
-        path.end,
-        path.low,
-        path.high,
-        path.arc,
-        path.arcs,
-        path.boxes,
-        groups,
-        0,
-    )
-    foot = points_at(place, segment, path.start, path.end, path.low, path.high, path.arc, path.arcs)
-    return ContourError(frozen(distance), frozen(foot), frozen(place), frozen_integers(path.line[segment]))
+    table = frozen(pack(path.start, path.end, path.low, path.high, path.arc))
+    tree, first = stack_boxes(path.boxes)
+    errors: list[ContourError] = []
+    for signal in signals:
+        points = frozen(signal[:, :3])
+        distance, place, segment = feet(
+            points, lower, upper, table, path.low, path.high, path.arcs, path.boxes, tree, first
+        )
+        foot = points_at(
+            frozen(place), frozen_integers(segment),
+            path.start, path.end, path.low, path.high, path.arc, path.arcs,
+        )  # fmt: skip
+        errors.append(
+            ContourError(frozen(distance), frozen(foot), frozen(place), frozen_integers(path.line[segment]))
+        )
+    return tuple(errors)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -193,15 +197,17 @@ def measuring(
         upper = places[back + ahead :] + margin
         decided = upper.size
         if not last and decided:
+            # a move still to come may begin at the very end of those that are here: beyond, not at it
             arrived = path.high[-1] if path.low.size else -np.inf
-            decided = int(np.searchsorted(upper, arrived, side="right"))
+            reached = upper < arrived
+            decided = decided if reached.all() else int(reached.argmin())
         windows = frozen(places[:decided] - margin), frozen(upper[:decided])
-        errors = tuple(
-            _measure(signal[:decided], path, *windows) if decided else _NOTHING for signal in waiting
-        )
+        errors = tuple(_NOTHING for _ in waiting)
+        if decided:
+            errors = _measure([signal[:decided] for signal in waiting], path, *windows)
         places = places[decided : samples + back]
-        if places.size > back:
-            path = since(path, float(places[0]) - margin)
+        if places.size:
+            path = since(path, float(places[0]) - margin - BACKTRACK)
         return MeasuringState(path, places, tuple(signal[decided:] for signal in waiting)), errors
 
     return step

@@ -205,7 +205,6 @@ class Trial:
         return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual)
 
 
-
 def run(
     blocks: Iterable[Block],
     setup: Setup,
@@ -257,7 +256,9 @@ def run(
         if progress is not None:
             progress(block)
     if not moved:
-        raise InfeasibleError("the program moves nothing", hint="it has no G1, G2 or G3 with travel", source=program)
+        raise InfeasibleError(
+            "the program moves nothing", hint="it has no G1, G2 or G3 with travel", source=program
+        )
     summary = Summary(
         program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
         tuple(trial.summary() for trial in trials),

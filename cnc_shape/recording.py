@@ -134,7 +134,14 @@ class Outline:
         share = (np.arange(row.size) - np.repeat(np.cumsum(chords) - chords, chords) + 1) / chords[row]
         place = path.low[row] + share * (path.high[row] - path.low[row])
         points = points_at(
-            frozen(place), frozen_integers(row), path.start, path.end, path.low, path.high, path.arc, path.arcs
+            frozen(place),
+            frozen_integers(row),
+            path.start,
+            path.end,
+            path.low,
+            path.high,
+            path.arc,
+            path.arcs,
         )
         self._points.append(points if self._points else np.vstack([path.start[:1], points]))
 

@@ -44,7 +44,7 @@ def segments(toolpath: Toolpath, *, first: bool) -> Segments:
     keep = np.flatnonzero(wanted)
     start, end = toolpath.start[keep, :3], toolpath.end[keep, :3]
     low, high = low[keep], high[keep]
-    is_arc = (toolpath.kind[keep] == Motion.ARC) & (high > low)
+    is_arc = (toolpath.kind[keep] == Motion.ARC) & (high > low) & (toolpath.sweep[keep] != 0.0)
     rows = keep[is_arc]
     arc = np.full(keep.size, -1)
     arc[is_arc] = np.arange(rows.size)
@@ -102,14 +102,16 @@ def _arcs(
     length: FloatArray,
 ) -> FloatArray:
     """Table of arcs, (a,17), from their programmed form."""
-    arm = start - center
-    radius = np.sqrt((arm * arm).sum(axis=1))
-    first = arm / radius[:, None]
-    second = np.cross(normal, first) * np.sign(sweep)[:, None]
-    rise = ((end - start) * normal).sum(axis=1)
-    in_plane = end - center - rise[:, None] * normal
     angle = np.abs(sweep)
-    growth = (np.sqrt((in_plane * in_plane).sum(axis=1)) - radius) / angle
+    rise = ((end - start) * normal).sum(axis=1)
+    arm, end_arm = start - center, end - center - rise[:, None] * normal
+    radius, end_radius = (np.sqrt((vector * vector).sum(axis=1)) for vector in (arm, end_arm))
+    # a spiral out of its center has no direction at its start: turn that of its end back
+    back = np.cos(sweep)[:, None] * end_arm - np.sin(sweep)[:, None] * np.cross(normal, end_arm)
+    outward = np.where((radius > 0.0)[:, None], arm, back)
+    first = outward / np.where(radius > 0.0, radius, end_radius)[:, None]
+    second = np.cross(normal, first) * np.sign(sweep)[:, None]
+    growth = (end_radius - radius) / angle
     # rounding of the end point is no spiral
     growth = np.where(np.abs(growth * angle) <= 1e-12 * radius, 0.0, growth)
     climb = np.where(np.abs(rise) <= 1e-12 * radius, 0.0, rise / angle)

@@ -56,7 +56,7 @@ class SimulationState:
 
 def simulating(
     machine: Machine, control: Control
-) -> Callable[[SimulationState | None, Trajectory, bool], tuple[SimulationState, Response]]:
+) -> Callable[[SimulationState | None, Trajectory, bool], tuple[SimulationState | None, Response]]:
     """Return the resumable stage that runs a command through a machine's loop and structure.
 
     The machine's axes are the command's, in its order. A tick needs the sample after it, so the stage
@@ -87,7 +87,11 @@ def simulating(
 
     def step(
         state: SimulationState | None, command: Trajectory, last: bool
-    ) -> tuple[SimulationState, Response]:
+    ) -> tuple[SimulationState | None, Response]:
+        if state is None and len(command) == 0:
+            return None, Response(
+                command, command.position, command.position, command.position, command.position
+            )
         now = _start(plant, command, control) if state is None else _copy(state)
         command = _join(now.held, command)
         ticks = len(command) if last else max(len(command) - 1, 0)

@@ -8,7 +8,7 @@ import numpy as np
 
 
 def curve_points(toolpath, row, shares):
-    """Points of a segment at shares of its angle (arcs) or length (lines), (k,3), from its programmed form."""
+    """Points of a segment at shares of its angle (arcs) or length (lines), (k,3), as programmed."""
     start, end = toolpath.start[row, :3], toolpath.end[row, :3]
     if toolpath.kind[row] != 2:
         return start + shares[:, None] * (end - start)
@@ -16,11 +16,15 @@ def curve_points(toolpath, row, shares):
     arm = start - center
     side = np.cross(normal, arm)
     rise = (end - start) @ normal
-    outer = np.linalg.norm(end - center - rise * normal) / np.linalg.norm(arm)
-    growth = 1.0 + (outer - 1.0) * shares
+    end_arm = end - center - rise * normal
+    radius = np.linalg.norm(arm) + (np.linalg.norm(end_arm) - np.linalg.norm(arm)) * shares
+    if np.linalg.norm(arm) == 0.0:  # a spiral out of its center: turn its end back
+        arm = np.cos(sweep) * end_arm - np.sin(sweep) * np.cross(normal, end_arm)
+        side = np.cross(normal, arm)
     angle = sweep * shares
     plane = np.cos(angle)[:, None] * arm + np.sin(angle)[:, None] * side
-    return center + growth[:, None] * plane + shares[:, None] * rise * normal
+    outward = radius / np.linalg.norm(arm)
+    return center + outward[:, None] * plane + shares[:, None] * rise * normal
 
 
 def places(toolpath, row, shares):
@@ -32,6 +36,20 @@ def places(toolpath, row, shares):
     steps = np.linalg.norm(np.diff(curve_points(toolpath, row, fine), axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     return low + (high - low) * np.interp(shares, fine, along / along[-1])
+
+
+def polyline_distance(point, toolpath, lower, upper):
+    """Least distance to a path of lines within the window: every segment, cut by the window, at once."""
+    low, high = toolpath.arc_length[:-1], toolpath.arc_length[1:]
+    lower, upper = np.clip([lower, upper], 0.0, toolpath.arc_length[-1])
+    touched = (high >= lower) & (low <= upper)
+    low, high, start = low[touched], high[touched], toolpath.start[touched, :3]
+    chord = toolpath.end[touched, :3] - start
+    share = ((point - start) * chord).sum(axis=1) / (chord**2).sum(axis=1)
+    share = np.clip(
+        share, np.clip((lower - low) / (high - low), 0, 1), np.clip((upper - low) / (high - low), 0, 1)
+    )
+    return np.linalg.norm(start + share[:, None] * chord - point, axis=1).min()
 
 
 def contour_distance(point, toolpath, lower=-np.inf, upper=np.inf, count=2001, rounds=4):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import naive
 import numpy as np
 import pytest
@@ -9,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, rows, toolpath
+from scipy.optimize import minimize_scalar
 
+from cnc_shape.arrays import frozen
 from cnc_shape.contour import ContourError, Tally, contour_error, foot_windows, measuring, tally
 from cnc_shape.segments import segments, since
 
@@ -111,6 +116,141 @@ def test_a_point_on_the_path_has_no_error(seed):
     assert whole(points, path).max <= 1e-11
 
 
+def test_helix_foot_is_where_scipy_finds_it():
+    radius, pitch, turns = 20.0, 10.0, 2
+    path = toolpath(arc((radius, 0, pitch * turns), (0, 0, 0), turns * TURN), start=(radius, 0, 0))
+    slope = np.hypot(radius, pitch / TURN)
+    rng = np.random.default_rng(8)
+    for point in rng.uniform([-25, -25, -5], [25, 25, 25], (40, 3)):
+
+        def distance(angle, point=point):
+            curve = [radius * np.cos(angle), radius * np.sin(angle), pitch * angle / TURN]
+            return np.linalg.norm(np.array(curve) - point)
+
+        starts = np.linspace(0, turns * TURN, 60)
+        found = [
+            minimize_scalar(distance, bounds=(a, b), method="bounded", options={"xatol": 1e-11})
+            for a, b in pairwise(starts)
+        ]
+        best = min(found, key=lambda f: f.fun)
+        error = whole(point, path)
+        assert_allclose(error.distance, min(best.fun, distance(0), distance(turns * TURN)), atol=1e-9)
+        assert_allclose(error.arc_length, slope * best.x, atol=2e-4)
+
+
+@given(
+    st.floats(0.0, 0.05), st.floats(0.001, 0.05), st.floats(0.1, 15.0), st.sampled_from([-1, 1]),
+    st.floats(-0.1, 0.1), st.integers(0, 10_000),
+)  # fmt: skip
+@settings(max_examples=60)
+def test_the_tightest_spirals_equal_brute_force(inner, outer, sweep, sense, rise, seed):
+    # radii as small as the tolerance of an arc's ends: the radius changes as fast as the angle
+    sweep *= sense
+    end = (outer * np.cos(sweep), outer * np.sin(sweep), rise)
+    path = toolpath(arc(end, (0, 0, 0), sweep), start=(inner, 0, 0))
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1.5, 1.5, (6, 3)) * [0.05, 0.05, 0.1]
+    expected = [naive.contour_distance(p, path, count=4001) for p in points]
+    error = whole(points, path)
+    assert_allclose(error.distance, expected, atol=1e-8)
+    assert_allclose(np.linalg.norm(points - error.foot, axis=1), error.distance, atol=1e-9)
+
+
+def test_a_spiral_may_begin_at_its_center():
+    path = toolpath(arc((0.02, 0.0, 0.0), (0.0, 0.0, 0.0), np.pi))  # its radius is 0.02 angle / pi
+    error = whole([[0.0, -0.01, 0.0], [0.0, 0.0, 0.0], [0.03, 0.0, 0.0]], path)
+    assert_allclose(error.distance, [0.0, 0.0, 0.01], atol=1e-17)
+
+
+def rotation(seed):
+    """A proper rotation matrix."""
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q if np.linalg.det(q) > 0 else -q
+
+
+def moved(path, matrix, shift, scale=1.0):
+    """The path turned (a permutation may mirror it), shifted and scaled."""
+    mirror = np.sign(np.linalg.det(matrix))
+    return replace(
+        path,
+        start=frozen(scale * path.start @ matrix.T + shift),
+        end=frozen(scale * path.end @ matrix.T + shift),
+        center=frozen(scale * path.center @ matrix.T + shift),
+        normal=frozen(path.normal @ matrix.T),
+        sweep=frozen(mirror * path.sweep),
+        arc_length=frozen(scale * path.arc_length),
+    )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_rigid_motion_changes_nothing(seed):
+    path, matrix = some_path(seed), rotation(seed)
+    rng = np.random.default_rng(seed)
+    shift = rng.uniform(-100, 100, 3)
+    points = rng.uniform(-15, 15, (50, 3))
+    lower = rng.uniform(0, path.arc_length[-1], 50)
+    upper = lower + rng.uniform(0, 20, 50)
+    here = contour_error(points, path, lower, upper)
+    there = contour_error(points @ matrix.T + shift, moved(path, matrix, shift), lower, upper)
+    assert_allclose(there.distance, here.distance, atol=1e-9)
+    assert_allclose(there.foot, here.foot @ matrix.T + shift, atol=1e-6)
+
+
+@pytest.mark.parametrize("order", [[1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1]])
+def test_axes_may_be_exchanged_and_the_part_scaled(order):
+    path, matrix = some_path(2), np.eye(3)[order]
+    points = np.random.default_rng(2).uniform(-15, 15, (50, 3))
+    here = whole(points, path)
+    there = whole(2.5 * points @ matrix.T, moved(path, matrix, 0.0, 2.5))
+    assert_allclose(there.distance, 2.5 * here.distance, rtol=1e-9)
+    assert_allclose(there.arc_length, 2.5 * here.arc_length, atol=1e-6)
+
+
+def dense_path(count=3000):
+    """A curve in steps of about 0.02 mm that comes back to itself."""
+    u = np.linspace(0.0, 3 * TURN, count + 1)
+    points = np.stack([3 * np.sin(2 * u), 3 * np.sin(3 * u + 0.3), 0.2 * np.sin(u)], axis=1)
+    return toolpath(*[line(*p) for p in points[1:]], start=tuple(points[0]))
+
+
+def test_many_segments_equal_brute_force_over_all_of_them():
+    path = dense_path()
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-3.5, 3.5, (300, 3)) * [1, 1, 0.1]
+    lower = rng.uniform(-5, path.arc_length[-1], 300)
+    upper = lower + 10 ** rng.uniform(-3, 2, 300)
+    error = contour_error(points, path, lower, upper)
+    expected = [naive.polyline_distance(p, path, a, b) for p, a, b in zip(points, lower, upper, strict=True)]
+    assert_allclose(error.distance, expected, atol=1e-12)
+    assert_allclose(np.linalg.norm(points - error.foot, axis=1), error.distance, atol=1e-12)
+
+
+@pytest.mark.parametrize("make", [dense_path, lambda: some_path(4), lambda: some_path(7)])
+def test_what_was_measured_before_does_not_change_a_bit(make):
+    path = make()
+    rng = np.random.default_rng(4)
+    count = 500
+    points = path.end[rng.integers(len(path), size=count)] + rng.choice([0.0, 0.1, 3.0], (count, 1))
+    lower = rng.uniform(-1, path.arc_length[-1], count)
+    upper = lower + 10 ** rng.uniform(-3, 2, count)
+    at_once = contour_error(points, path, lower, upper)
+    shuffled = rng.permutation(count)
+    again = contour_error(points[shuffled], path, lower[shuffled], upper[shuffled])
+    for name in ("distance", "foot", "arc_length", "line"):
+        assert_array_equal(getattr(again, name), getattr(at_once, name)[shuffled])
+
+
+def test_of_equally_near_points_the_first_counts():
+    path = toolpath(line(2, 0), line(2, 2), line(0, 2), line(0, 0))  # from its middle, all sides are alike
+    error = whole([[1.0, 1.0, 0.0]] * 2 + [[1.9, 0.1, 0.0]], path)
+    assert_array_equal(error.arc_length[:2], [1.0, 1.0])
+    assert error.line.tolist() == [1, 1, 1]
+    circle = toolpath(arc((5, 0, 0), (0, 0, 0), 3 * TURN), start=(5, 0, 0))
+    assert_allclose(whole([[0.0, 6.0, 0.0]], circle).arc_length, 5 * np.pi / 2)
+    assert whole([[0.0, 0.0, 1.0]], circle).arc_length == 0.0
+
+
 @given(st.integers(0, 10_000))
 @settings(max_examples=20)
 def test_moving_the_workpiece_moves_nothing_else(seed):
@@ -167,7 +307,7 @@ def streamed(path, place, signals, cuts, path_cuts, back, ahead, margin):
     step, state, parts, seen = measuring(back, ahead, margin), None, [], 0
     bounds = [0, *cuts, len(place)]
     path_bounds = [0, *path_cuts, len(path)]
-    for low, high in zip(bounds[:-1], bounds[1:], strict=True):
+    for low, high in pairwise(bounds):
         last = high == len(place)
         while seen < len(path_bounds) - 1 and (
             last or path.arc_length[path_bounds[seen]] <= place[max(high - 1, 0)]
@@ -218,6 +358,32 @@ def test_streamed_equals_whole_bit_for_bit(chunk, path_chunk):
         assert_array_equal(mine.foot, theirs.foot)
         assert_array_equal(mine.arc_length, theirs.arc_length)
         assert_array_equal(mine.line, theirs.line)
+
+
+@pytest.mark.parametrize(("back", "ahead"), [(0, 0), (3, 0), (0, 2), (5, 40)])
+def test_streamed_where_windows_end_on_vertices(back, ahead):
+    # places, segments and margin on one grid: windows begin and end where segments do
+    corners = np.cumsum(np.random.default_rng(6).choice([-1.0, 1.0], (60, 3)) * [[0.5, 0.0, 0.0]], axis=0)
+    corners[::2, 1] += 0.5
+    path = toolpath(*[line(*c) for c in corners])
+    place = np.repeat(path.arc_length[:-1], 3)
+    signal = np.repeat(corners, 3, axis=0) + np.array([0.0, 0.25, 0.0])
+    expected = contour_error(signal, path, *foot_windows(place, back, ahead, 0.5))
+    (got,) = streamed(path, place, [signal], range(4, len(place), 4), range(1, len(path)), back, ahead, 0.5)
+    for name in ("distance", "foot", "arc_length", "line"):
+        assert_array_equal(getattr(got, name), getattr(expected, name))
+
+
+@pytest.mark.parametrize(("back", "ahead"), [(0, 0), (20, 10)])
+def test_memory_does_not_grow_with_the_path(back, ahead):
+    step, state, held = measuring(back, ahead, 0.5), None, []
+    for k in range(50):
+        path = toolpath(*[line(10.0 * k + 0.1 * j, 0.0) for j in range(1, 101)], start=(10.0 * k, 0.0, 0.0))
+        path = replace(path, arc_length=frozen(path.arc_length + 10.0 * k))
+        place = 10.0 * k + np.linspace(0.0, 9.9, 100)
+        state, _ = step(state, path, place, (np.stack([place, 0 * place, 0 * place], axis=1),), False)
+        held.append(state.path.low.size)
+    assert max(held) <= 300
 
 
 def test_path_out_of_reach_is_forgotten():

@@ -17,11 +17,15 @@ from typing import Annotated, Final
 import typer
 
 from cnc_shape import __version__
+from cnc_shape.cli.apply import apply
+from cnc_shape.cli.check import check
+from cnc_shape.cli.design import design
 from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
 from cnc_shape.cli.init import init
 from cnc_shape.cli.output import print_text
+from cnc_shape.cli.simulate import simulate
 
-COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (init,)
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init)
 
 app = typer.Typer(
     name="cnc-shape",

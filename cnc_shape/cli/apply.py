@@ -31,15 +31,16 @@ def apply(
 ) -> None:
     """Shape a program's axis commands and write them at the servo period."""
     from cnc_shape.applying import Application
-    from cnc_shape.cli.inputs import open_motion, reading_options, warn
-    from cnc_shape.cli.output import print_json, print_text
+    from cnc_shape.cli.output import print_json, print_text, warn
     from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.config.setup import Shaping
+    from cnc_shape.opening import open_motion
 
     target = _target(file, output, force=force)
     setup = load_machine(machine)
-    options = reading_options(dialect, path, setup, block_delete=block_delete, closed=closed)
+    options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
     with open_motion(file, setup, options) as motion, progress("applying", None, quiet=quiet or json):
         work = Application(motion.blocks, setup.machine, shapers, setup.control.sample_time)
@@ -69,10 +70,14 @@ def _target(file: str, output: str | None, *, force: bool) -> Path | None:
         output = f"{stem}.shaped.csv"
     target = Path(output)
     if target.suffix.lower() not in SUFFIXES:
-        hint = "use .csv or .npz" + ("; .nc is not built yet" if target.suffix.lower() in (".nc", ".ngc") else "")
+        hint = "use .csv or .npz" + (
+            "; .nc is not built yet" if target.suffix.lower() in (".nc", ".ngc") else ""
+        )
         raise OptionError(f"cannot write {target.suffix or 'a file without suffix'}: {output}", hint=hint)
     if file != "-" and target.exists() and Path(file).exists() and target.samefile(file):
-        raise OptionError(f"{output} is the input itself", hint="name another output: inputs are never overwritten")
+        raise OptionError(
+            f"{output} is the input itself", hint="name another output: inputs are never overwritten"
+        )
     check_target(target, force=force)
     return target
 

@@ -23,7 +23,9 @@ def design(
     ] = None,
     machine: Annotated[
         str | None,
-        typer.Option("-m", "--machine", envvar="CNC_SHAPE_MACHINE", help="Machine file: a shaper for each axis."),
+        typer.Option(
+            "-m", "--machine", envvar="CNC_SHAPE_MACHINE", help="Machine file: a shaper for each axis."
+        ),
     ] = None,
     of: Annotated[str, typer.Option(help="Single-mode shaper that a cascade is made of.")] = "zv",
     vibration_tolerance: Annotated[
@@ -39,9 +41,13 @@ def design(
 
     known = [*SINGLE_MODE, *MULTI_MODE]
     if shaper not in known:
-        raise OptionError(f"unknown shaper {shaper!r}", hint="the shapers built so far are " + ", ".join(known))
+        raise OptionError(
+            f"unknown shaper {shaper!r}", hint="the shapers built so far are " + ", ".join(known)
+        )
     if of not in SINGLE_MODE:
-        raise OptionError(f"a cascade is made of {' or '.join(SINGLE_MODE)}, not {of!r}", hint="leave --of out for zv")
+        raise OptionError(
+            f"a cascade is made of {' or '.join(SINGLE_MODE)}, not {of!r}", hint="leave --of out for zv"
+        )
     if of != "zv" and shaper != "cascade":
         raise OptionError(f"--of belongs to cascade, not to {shaper}")
     frequencies, dampings = frequency_hz or [], damping_ratio or []
@@ -81,7 +87,9 @@ def _machine_modes(machine: str | None) -> list[tuple[str | None, tuple[Mode, ..
         raise OptionError("which mode?", hint="give --frequency-hz and --damping-ratio, or -m MACHINE")
     axes = [(axis.name, axis.modes) for axis in load_machine(machine).machine.axes if axis.modes]
     if not axes:
-        raise OptionError(f"{machine} has no modes", hint="give an axis modes: [{frequency_hz: 30, damping_ratio: 0.02}]")
+        raise OptionError(
+            f"{machine} has no modes", hint="give an axis modes: [{frequency_hz: 30, damping_ratio: 0.02}]"
+        )
     return list(axes)
 
 

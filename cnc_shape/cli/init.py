@@ -8,7 +8,9 @@ import typer
 
 
 def init(
-    name: Annotated[str, typer.Argument(help="File to write; .yaml is added where it has no suffix.")] = "machine.yaml",
+    name: Annotated[
+        str, typer.Argument(help="File to write; .yaml is added where it has no suffix.")
+    ] = "machine.yaml",
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -20,7 +22,9 @@ def init(
 
     if name == "-":
         if json:
-            raise OptionError("- and --json both want standard output", hint="name a file, or leave --json out")
+            raise OptionError(
+                "- and --json both want standard output", hint="name a file, or leave --json out"
+            )
         print_text(machine_template())
         return
     path = template_path(name)

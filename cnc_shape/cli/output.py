@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 
 def print_json(command: str | None, result: Mapping[str, object]) -> None:
@@ -34,6 +34,13 @@ def print_text(text: str) -> None:
 def print_error(text: str) -> None:
     """Print one line on stderr."""
     sys.stderr.write(one_line(text) + "\n")
+
+
+def warn(warnings: Iterable[str], *, quiet: bool) -> None:
+    """Print warnings on stderr, one line each."""
+    if not quiet:
+        for warning in warnings:
+            print_error(warning)
 
 
 def one_line(text: str) -> str:

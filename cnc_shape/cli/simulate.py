@@ -10,7 +10,6 @@ import typer
 from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Force, Json, Machine, PathStyle, Quiet
 
 if TYPE_CHECKING:
-    from cnc_shape.config.setup import Setup
     from cnc_shape.pipeline import Run
     from cnc_shape.report.figures import Format
     from cnc_shape.report.folder import Context
@@ -21,10 +20,14 @@ SAMPLE = "bracket.nc"
 def simulate(
     file: Annotated[
         str | None,
-        typer.Argument(metavar="[FILE]", help="G-code or CSV; - for standard input; without it the bundled bracket."),
+        typer.Argument(
+            metavar="[FILE]", help="G-code or CSV; - for standard input; without it the bundled bracket."
+        ),
     ] = None,
     machine: Machine = None,
-    report: Annotated[bool, typer.Option("--report", help="Write a run folder with page, figures and signals.")] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write a run folder with page, figures and signals.")
+    ] = False,
     output: Annotated[
         str | None, typer.Option("-o", "--output", metavar="DIR", help="The run folder; implies --report.")
     ] = None,
@@ -45,36 +48,43 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
+    from cnc_shape.api import report_context
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
-    from cnc_shape.cli.inputs import digest, open_motion, reading_options, warn
-    from cnc_shape.cli.output import print_error, print_json
+    from cnc_shape.cli.output import print_error, print_json, warn
     from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.reading import named_options
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
+    from cnc_shape.opening import open_motion
     from cnc_shape.pipeline import default_cases, pick_cases, run
     from cnc_shape.report.table import summary_json
 
     gates = [parse_gate(text) for text in fail_on or []]
     kind = _figure_format(figures)
     setup = load_machine(machine)
-    picked = default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
+    picked = (
+        default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
+    )
     wanted = report or output is not None
     if output is not None:
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
-    options = reading_options(dialect, path, setup, block_delete=block_delete, closed=closed)
+    options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
         result = run(motion.blocks, setup, picked, motion.name, record=wanted)
     warnings = [*setup.warnings, *motion.warnings()]
     page = None
     if wanted:
-        context = _context(motion.name, digest(source), setup, warnings, cases, kind)
+        command = ["simulate", motion.name, *(["--cases", cases] if cases else [])]
+        context = report_context([source], setup, command, warnings, kind)
         page = _report(result, output, context, force=force)
     warn(warnings, quiet=quiet)
     if json:
         extra = {} if page is None else {"report": str(page)}
-        print_json("simulate", {**{k: v for k, v in summary_json(result.summary).items() if k != "schema"}, **extra})
+        print_json(
+            "simulate", {**{k: v for k, v in summary_json(result.summary).items() if k != "schema"}, **extra}
+        )
     else:
         _print_table(result, page)
     failures = [failure for gate in gates if (failure := gate.failure(result.summary)) is not None]
@@ -97,27 +107,6 @@ def _check_folder(folder: Path, *, force: bool) -> None:
     from cnc_shape.writers.publish import check_folder
 
     check_folder(folder, MARKER, force=force)
-
-
-def _context(
-    name: str, sha256: str, setup: Setup, warnings: list[str], cases: str | None, kind: Format
-) -> Context:
-    from cnc_shape.config.dump import dump_machine
-    from cnc_shape.config.setup import Shaping
-    from cnc_shape.report.figures import Format
-    from cnc_shape.report.folder import Context
-
-    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
-    command = ["simulate", name, *(["--cases", cases] if cases else [])]
-    return Context(
-        command=command,
-        inputs={name: sha256},
-        machine=dump_machine(setup),
-        shapers=shapers,
-        modes={axis.name: axis.modes for axis in setup.machine.axes},
-        warnings=warnings,
-        figure_format=kind,
-    )
 
 
 def _report(result: Run, output: str | None, context: Context, *, force: bool) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, cast
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -98,6 +98,8 @@ def _words(path: Path, detail: ErrorDetails) -> tuple[str, str]:
     if kind in _RELATIONS:
         name, relation = _RELATIONS[kind]
         return f"must be {relation} {context[name]:g}, not {_shown(value)}", "check the number and its unit"
+    if kind == "string_unicode":
+        return "must be one printable line", "write plain text"
     if kind == "finite_number":
         return f"must be finite, not {_shown(value)}", "give a number that can be written out"
     if kind in ("too_short", "too_long"):
@@ -111,8 +113,8 @@ def _word(path: Path, kind: str, value: object, context: Mapping[str, object]) -
     known = str(context["expected_tags" if kind == "union_tag_invalid" else "expected"])
     words = [word.strip(" '") for word in known.replace(" or ", ",").split(",")]
     owner = str(path[-2]) if len(path) > 1 else ""
-    given = context.get("tag") if kind == "union_tag_invalid" else value
-    if given in _TYPES_NOT_BUILT.get(owner, ()):
+    given = cast("Mapping[str, object]", value)["type"] if kind == "union_tag_invalid" else value
+    if isinstance(given, str) and given in _TYPES_NOT_BUILT.get(owner, ()):
         return f"{given} is not built yet", "use " + " or ".join(words)
     return f"must be {' or '.join(words)}, not {_shown(given)}", suggestion(str(given), words)
 

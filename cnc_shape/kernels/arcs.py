@@ -36,6 +36,15 @@ NODE_2, WEIGHT_2 = 0.3399810435848563, 0.6521451548625461
 
 
 @kernel
+def reach(d_v2):
+    """Square of a distance a little above sqrt(d_v2), mm^2: beyond it, no rounding makes anything nearer.
+
+    Coordinates are below 1e6 mm, so distances are rounded by less than 1e-9 mm.
+    """
+    return (sqrt(d_v2) * (1.0 + 1e-12) + 1e-9) ** 2
+
+
+@kernel
 def quadrature(radius, g, h, angle):
     """Length from the start to `angle`, mm: the integral of sqrt(r^2 + g^2 + h^2) over it."""
     w_v2 = g * g + h * h
@@ -124,19 +133,15 @@ def lowest_of_valley(radius, g, h, rho, theta, z, low, high):
             right = angle
         else:
             left = angle
+        if left >= right:  # at an end of the valley, which rises from there
+            return angle
         following = angle - slope / (g * g + h * h + rho * (2.0 * g * s + r * c))
-        if following <= left:  # beyond an end of the valley, or too far
-            following = (
-                low if left == low and angle != low else (left if left == low else 0.5 * (left + right))
-            )
-        elif following >= right:
-            following = (
-                high
-                if right == high and angle != high
-                else (right if right == high else 0.5 * (left + right))
-            )
-        if abs(following - angle) <= 1e-15 * (1.0 + abs(angle)):
-            return following
+        if abs(following - angle) <= 2e-15 * (1.0 + abs(angle)):
+            return angle
+        if following < left:
+            following = low if left == low else 0.5 * (left + right)
+        elif following > right:
+            following = high if right == high else 0.5 * (left + right)
         angle = following
     return angle
 
@@ -210,17 +215,8 @@ def search_piece(radius, g, h, rho, theta, z, low, high, best, best_angle, reach
 
 
 @kernel
-def reach(d_v2):
-    """Square of a distance a little above sqrt(d_v2), mm^2: beyond it, no rounding makes anything nearer.
-
-    Coordinates are below 1e6 mm, so distances are rounded by less than 1e-9 mm.
-    """
-    return (sqrt(d_v2) * (1.0 + 1e-12) + 1e-9) ** 2
-
-
-@kernel
 def nearest_on_spiral(radius, g, h, rho, theta, z, low, high, reach_v2):
-    """(d^2, angle) of the nearest point of a helix or spiral within [low, high]; the smallest angle of equals.
+    """(d^2, angle) of the nearest point of a helix or spiral in [low, high]; the smallest angle of equals.
 
     The least d^2 is at an end or at an interior minimum. Each turn is cut where it turns away from the
     point, |psi| = CORE. Within the core the curvature of d^2 is at least rho (r/2 - sqrt(3) |g|) > 0 for
@@ -271,7 +267,7 @@ def nearest_on_circle(radius, rho, theta, z, low, high):
 
 @kernel
 def nearest_on_arc(arcs, j, px, py, pz, low, high, reach_v2):
-    """(d^2, angle) of the nearest point of arc j within [low, high]; (inf, low) if out of reach. arcs (a,17)."""
+    """(d^2, angle) of the nearest point of arc j in [low, high]; (inf, low) if out of reach. arcs (a,17)."""
     wx, wy, wz = px - arcs[j, 0], py - arcs[j, 1], pz - arcs[j, 2]
     x = wx * arcs[j, 3] + wy * arcs[j, 4] + wz * arcs[j, 5]
     y = wx * arcs[j, 6] + wy * arcs[j, 7] + wz * arcs[j, 8]

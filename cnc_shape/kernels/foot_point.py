@@ -8,113 +8,218 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.arcs import angle_at, length_at, nearest_on_arc, reach
 
-GROUP = 16  # segments that share a bounding box
+FAN_BITS = 2
+FAN = 1 << FAN_BITS  # boxes that one box of the next level holds
 
 
 @kernel
-def group_boxes(boxes):
-    """Bounding boxes of every GROUP segments. boxes (m,6): lowest x, y, z, highest x, y, z."""
-    groups = (boxes.shape[0] + GROUP - 1) // GROUP
-    out = np.empty((groups, 6))
-    for g in range(groups):
+def pack(start, end, low, high, arc):
+    """What the search reads of every segment, side by side in memory, (m,10).
+
+    start, end (m,3) mm; low, high (m,) mm of path; arc (m,) row of arcs or -1. Columns: start, end minus
+    start, 1 / chord^2, arc, low, high minus low.
+    """
+    out = np.empty((start.shape[0], 10))
+    for j in range(start.shape[0]):
+        chord_v2 = 0.0
         for i in range(3):
-            out[g, i], out[g, 3 + i] = inf, -inf
-        for j in range(g * GROUP, min(boxes.shape[0], (g + 1) * GROUP)):
-            for i in range(3):
-                out[g, i] = min(out[g, i], boxes[j, i])
-                out[g, 3 + i] = max(out[g, 3 + i], boxes[j, 3 + i])
+            step = end[j, i] - start[j, i]
+            out[j, i], out[j, 3 + i] = start[j, i], step
+            chord_v2 += step * step
+        out[j, 6] = 1.0 / chord_v2 if chord_v2 > 0.0 else 0.0
+        out[j, 7], out[j, 8], out[j, 9] = arc[j], low[j], high[j] - low[j]
     return out
+
+
+@kernel
+def stack_boxes(boxes):
+    """Boxes around FAN boxes each, level upon level until few are left.
+
+    boxes (m,6): lowest x, y, z, highest x, y, z. Returns tree (b,6) and first (l+1,): box g of level n, n
+    from 1, is ``tree[first[n - 1] + g]`` and holds the segments from ``g FAN^n`` to ``(g + 1) FAN^n - 1``.
+    """
+    levels, total, size = 0, 0, boxes.shape[0]
+    while levels == 0 or size > FAN:
+        size = (size + FAN - 1) // FAN
+        total += size
+        levels += 1
+    tree = np.empty((total, 6))
+    first = np.zeros(levels + 1, np.int64)
+    size = boxes.shape[0]
+    for level in range(levels):
+        above = (size + FAN - 1) // FAN
+        first[level + 1] = first[level] + above
+        for g in range(above):
+            for i in range(3):
+                lowest, highest = inf, -inf
+                for j in range(g * FAN, min((g + 1) * FAN, size)):
+                    if level == 0:
+                        lowest, highest = min(lowest, boxes[j, i]), max(highest, boxes[j, 3 + i])
+                    else:
+                        below = first[level - 1] + j
+                        lowest, highest = min(lowest, tree[below, i]), max(highest, tree[below, 3 + i])
+                tree[first[level] + g, i], tree[first[level] + g, 3 + i] = lowest, highest
+        size = above
+    return tree, first
 
 
 @kernel
 def box_distance_v2(boxes, j, x, y, z):
     """Squared distance of a point to box j, mm^2; 0 inside. boxes (m,6)."""
-    dx = max(boxes[j, 0] - x, 0.0, x - boxes[j, 3])
-    dy = max(boxes[j, 1] - y, 0.0, y - boxes[j, 4])
-    dz = max(boxes[j, 2] - z, 0.0, z - boxes[j, 5])
+    dx = max(max(boxes[j, 0] - x, x - boxes[j, 3]), 0.0)
+    dy = max(max(boxes[j, 1] - y, y - boxes[j, 4]), 0.0)
+    dz = max(max(boxes[j, 2] - z, z - boxes[j, 5]), 0.0)
     return dx * dx + dy * dy + dz * dz
 
 
 @kernel
-def nearest_on_segment(start, end, low, high, arc, arcs, j, x, y, z, lower, upper, reach_v2):
+def seek(places, value, guess):
+    """Smallest j with places[j] >= value, or places.size; places (m,) rise. Quick if `guess` is near it."""
+    size = places.size
+    left, right, stride = guess, guess, 1
+    while left >= 0 and places[left] >= value:
+        right = left
+        left = left - stride if left >= stride else -1
+        stride *= 2
+    stride = 1
+    while right < size and not places[right] >= value:
+        left = right
+        right = min(right + stride, size)
+        stride *= 2
+    while right - left > 1:  # places[left] < value <= places[right]
+        middle = (left + right) // 2
+        if places[middle] >= value:
+            right = middle
+        else:
+            left = middle
+    return right
+
+
+@kernel
+def nearest_on_line(table, j, x, y, z, first, last):
+    """(d^2, share) of the nearest point of line j, its share of the line in [first, last]. table (m,10)."""
+    ux, uy, uz = table[j, 3], table[j, 4], table[j, 5]
+    dx, dy, dz = x - table[j, 0], y - table[j, 1], z - table[j, 2]
+    share = min(max((ux * dx + uy * dy + uz * dz) * table[j, 6], first), last)
+    dx, dy, dz = dx - share * ux, dy - share * uy, dz - share * uz
+    return dx * dx + dy * dy + dz * dz, share
+
+
+@kernel
+def nearest_on_segment(table, arcs, j, x, y, z, lower, upper, reach_v2):
     """(d^2, place) of the nearest point of segment j that lies in the window; (inf, 0) if out of reach.
 
-    Lines are parametrised by their length, arcs by their angle. place is mm of path.
+    Lines are parametrised by their length, arcs by their angle. place is mm of path. table (m,10) from
+    `pack`; arcs (a,17).
     """
-    length = high[j] - low[j]
-    first = max(lower, low[j]) - low[j]
-    last = min(upper, high[j]) - low[j]
-    if arc[j] >= 0:
-        a = arc[j]
+    length = table[j, 9]
+    first = max(lower - table[j, 8], 0.0)
+    last = max(min(upper - table[j, 8], length), 0.0)
+    a = int(table[j, 7])
+    if a >= 0:
         begin = 0.0 if first <= 0.0 else angle_at(arcs, a, first, length)
         finish = arcs[a, 15] if last >= length else angle_at(arcs, a, last, length)
         d_v2, angle = nearest_on_arc(arcs, a, x, y, z, begin, max(begin, finish), reach_v2)
         if d_v2 == inf:
             return inf, 0.0
-        return d_v2, low[j] + length_at(arcs, a, angle, length)
-    share = 0.0
-    ux, uy, uz = end[j, 0] - start[j, 0], end[j, 1] - start[j, 1], end[j, 2] - start[j, 2]
-    if length > 0.0:
-        wx, wy, wz = x - start[j, 0], y - start[j, 1], z - start[j, 2]
-        share = (ux * wx + uy * wy + uz * wz) / (ux * ux + uy * uy + uz * uz)
-        share = min(max(share, first / length), last / length)
-    dx = x - (start[j, 0] + share * ux)
-    dy = y - (start[j, 1] + share * uy)
-    dz = z - (start[j, 2] + share * uz)
-    return dx * dx + dy * dy + dz * dz, low[j] + share * length
+        return d_v2, table[j, 8] + length_at(arcs, a, angle, length)
+    scale = 1.0 / length if length > 0.0 else 0.0
+    d_v2, share = nearest_on_line(table, j, x, y, z, first * scale, 1.0 if last >= length else last * scale)
+    return d_v2, table[j, 8] + share * length
 
 
 @kernel
-def feet(points, lower, upper, start, end, low, high, arc, arcs, boxes, groups, cursor):
+def descend(table, guess, begin, finish, x, y, z):
+    """d^2 of the nearest of the lines around `guess`, from one to the next as long as it comes nearer.
+
+    Only lines between begin and finish, which lie in the window as a whole. table (m,10) from `pack`.
+    """
+    best, _ = nearest_on_line(table, guess, x, y, z, 0.0, 1.0)
+    for step in (1, -1):
+        j = guess + step
+        while begin < j < finish and table[j, 7] < 0.0:
+            d_v2, _ = nearest_on_line(table, j, x, y, z, 0.0, 1.0)
+            if d_v2 >= best:
+                break
+            best = d_v2
+            j += step
+    return best
+
+
+@kernel
+def feet(points, lower, upper, table, low, high, arcs, boxes, tree, first):
     """Nearest points of the path, each within its own window of it.
 
     The least squared distance of all segments in the window wins; among equals, the smallest place.
-    Boxes and the last sample's segment (`cursor` to begin with) only spare work: what they pass over is
-    farther by more than any rounding, so the result does not depend on them.
+    The search goes through the segments that touch the window, in order, and leaves out each box that is
+    farther away than the best so far, or than a first guess: the distance to a place ahead of the foot
+    before by as much as that one moved. With it, nearly all boxes are out of reach. Both only spare work:
+    what is passed over is farther by more than any rounding, so the result does not depend on them.
 
-    points (n,3) mm; lower, upper (n,) mm of path; start, end (m,3), low, high (m,) mm of path,
-    arc (m,) row of arcs or -1, arcs (a,17), boxes (m,6), groups (g,6).
-    Returns distance (n,), place (n,) mm, segment (n,), and the cursor of the next sample.
+    points (n,3) mm; lower, upper (n,) mm of path; table (m,10) from `pack`; low, high (m,) mm of path;
+    arcs (a,17); boxes (m,6); tree (b,6), first (l+1,) from `stack_boxes`.
+    Returns distance (n,), place (n,), segment (n,).
     """
-    n, m = points.shape[0], low.size
+    n, m, levels = points.shape[0], low.size, first.size - 1
     distance, place, segment = np.empty(n), np.empty(n), np.empty(n, np.int64)
-    begin = finish = cursor
+    begin = finish = foot = advance = 0
     for k in range(n):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         window_low = min(max(lower[k], low[0]), high[m - 1])
         window_high = max(min(upper[k], high[m - 1]), window_low)
-        while begin > 0 and high[begin - 1] >= window_low:
-            begin -= 1
-        while begin < m - 1 and high[begin] < window_low:
-            begin += 1
-        finish = max(finish, begin)
-        while finish < m - 1 and low[finish + 1] <= window_high:
-            finish += 1
-        while finish > begin and low[finish] > window_high:
+        begin = min(seek(high, window_low, begin), m - 1)  # the first that ends in the window or after
+        finish = seek(low, window_high, finish)  # the last that starts in the window or before
+        if finish == m or low[finish] > window_high:
             finish -= 1
-        guess = min(max(cursor, begin), finish)
-        best, best_place = nearest_on_segment(
-            start, end, low, high, arc, arcs, guess, x, y, z, window_low, window_high, inf
-        )
-        best_segment = guess
-        limit = reach(best)
-        for g in range(begin // GROUP, finish // GROUP + 1):
-            if box_distance_v2(groups, g, x, y, z) > limit:
-                continue
-            for j in range(max(begin, g * GROUP), min(finish, g * GROUP + GROUP - 1) + 1):
-                if j == guess or box_distance_v2(boxes, j, x, y, z) > limit:
+        finish = max(finish, begin)
+        guess = min(max(foot + advance, begin), finish)
+        before, foot, tried = foot, guess, -1
+        best, best_place = inf, window_low
+        if begin < guess < finish and table[guess, 7] < 0.0:
+            bound = descend(table, guess, begin, finish, x, y, z)
+        else:
+            tried = guess
+            best, best_place = nearest_on_segment(table, arcs, guess, x, y, z, window_low, window_high, inf)
+            bound = best
+        limit = reach(bound)
+        top = 1  # boxes larger than half the window tell nothing
+        while top < levels and (2 << (FAN_BITS * (top + 1))) <= finish - begin:
+            top += 1
+        j, level = begin, top
+        while j <= finish:
+            if level > 0:
+                block = j >> (FAN_BITS * level)
+                if box_distance_v2(tree, first[level - 1] + block, x, y, z) <= limit:
+                    level -= 1
                     continue
-                d_v2, at = nearest_on_segment(
-                    start, end, low, high, arc, arcs, j, x, y, z, window_low, window_high, limit
-                )
-                if d_v2 < best or (
-                    d_v2 == best and (at < best_place or (at == best_place and j < best_segment))
-                ):
-                    best, best_place, best_segment = d_v2, at, j
-                    limit = reach(best)
-        distance[k], place[k], segment[k] = sqrt(best), best_place, best_segment
-        cursor = best_segment
-    return distance, place, segment, cursor
+                j = (block + 1) << (FAN_BITS * level)
+            else:
+                stop = min((j | (FAN - 1)) + 1, finish + 1)
+                while j < stop:
+                    if j == tried:
+                        j += 1
+                        continue
+                    at = inf
+                    if table[j, 7] < 0.0 and begin < j < finish:
+                        d_v2, share = nearest_on_line(table, j, x, y, z, 0.0, 1.0)
+                        if d_v2 <= best:
+                            at = table[j, 8] + share * table[j, 9]
+                    elif box_distance_v2(boxes, j, x, y, z) <= limit:
+                        d_v2, at = nearest_on_segment(table, arcs, j, x, y, z, window_low, window_high, limit)
+                    else:
+                        d_v2 = inf
+                    if d_v2 < best or (d_v2 == best and (at < best_place or (at == best_place and j < foot))):
+                        best, best_place, foot = d_v2, at, j
+                        if best < bound:
+                            bound, limit = best, reach(best)
+                    j += 1
+                level = 1
+            while level < top and j & ((1 << (FAN_BITS * (level + 1))) - 1) == 0:
+                level += 1  # the largest box that begins here
+        distance[k], segment[k] = sqrt(best), foot
+        place[k] = min(max(best_place, window_low), window_high)
+        advance = foot - before
+    return distance, place, segment
 
 
 @kernel

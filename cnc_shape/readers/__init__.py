@@ -7,16 +7,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cnc_shape.errors import OptionError, ProgramError
 from cnc_shape.program import Program, concatenate
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
 from cnc_shape.readers.source import ReadingLimits, Source, lines, open_source
 from cnc_shape.readers.table import TIME, is_table, read_header
-from cnc_shape.readers.trajectories import TimedPoints, read_timed_points, resample, timed_program
+from cnc_shape.readers.timed import TimedPoints, read_timed_points, timed_program
 from cnc_shape.readers.waypoints import read_waypoints
-from cnc_shape.toolpath import Toolpath
-from cnc_shape.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from cnc_shape.toolpath import Toolpath
+    from cnc_shape.trajectory import Trajectory
 
 CSV = "csv"  # dialect of tables
 
@@ -49,6 +52,7 @@ class Reading:
     axes: tuple[str, ...]
     chunks: Iterator[Program]
     timed: TimedPoints | None = None  # the rows, if the table is a time trajectory
+    evidence: str = ""  # why this dialect
 
 
 Reader = Callable[[Source, ReadingOptions], Reading]
@@ -58,7 +62,7 @@ def gcode_reading(source: Source, options: ReadingOptions) -> Reading:
     """Read a program of G-code."""
     seen = survey(source, options.gcode.dialect)
     chunks = interpret(source, seen, replace(options.gcode, rows=options.rows, limits=options.limits))
-    return Reading(source.name, seen.dialect.value, seen.lines, seen.axes, chunks)
+    return Reading(source.name, seen.dialect.value, seen.lines, seen.axes, chunks, evidence=seen.evidence)
 
 
 def table_reading(source: Source, options: ReadingOptions) -> Reading:
@@ -130,6 +134,8 @@ def read_trajectory(
     ProgramError
         As `reading`; the table has no time.
     """
+    from cnc_shape.readers.trajectories import resample  # what only reads programs need not load the kernels
+
     options = options or ReadingOptions()
     with reading(path, options) as opened:
         if opened.timed is None:

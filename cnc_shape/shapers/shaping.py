@@ -72,19 +72,21 @@ def delays(shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: fl
 
 def shaping(
     shapers: Mapping[str, Shaper], sample_time: float
-) -> Callable[[ShapingState | None, Trajectory, bool], tuple[ShapingState, Trajectory]]:
+) -> Callable[[ShapingState | None, Trajectory, bool], tuple[ShapingState | None, Trajectory]]:
     """Return the resumable stage that shapes the axis commands.
 
     Before its first sample the command rests there; after its last it rests there for as long as the
     last impulse needs.
     """
 
-    def step(state: ShapingState | None, command: Trajectory, last: bool) -> tuple[ShapingState, Trajectory]:
+    def step(
+        state: ShapingState | None, command: Trajectory, last: bool
+    ) -> tuple[ShapingState | None, Trajectory]:
         placed = delays(shapers, command.axes, sample_time)
         history = int(placed.whole.max(initial=0)) + 2
         if state is None:
             if len(command) == 0:
-                raise ValueError("a motion starts with a sample")
+                return None, command
             state = _rest(command.position[0], command.arc_length[0], history)
         parts = [state, command]
         if last:

@@ -1,22 +1,18 @@
-"""What `simulate` and `apply` read: a program, way-points or a time trajectory, as a motion."""
+"""Opening a program, a table of way-points or a time trajectory as a motion that can be run."""
 
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from cnc_shape.cli.output import one_line
 from cnc_shape.config.setup import Setup
-from cnc_shape.errors import OptionError
 from cnc_shape.machine import LINEAR_DEFAULT
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
-from cnc_shape.readers import Curve, ReadingOptions, reading
-from cnc_shape.readers.gcode import Dialect, GcodeOptions
+from cnc_shape.readers import ReadingOptions, reading
 from cnc_shape.readers.trajectories import resample
 
 STANDARD_INPUT = "-"
@@ -47,32 +43,22 @@ class OpenMotion:
         return told
 
 
-def reading_options(dialect: str, path: str, setup: Setup, *, block_delete: bool, closed: bool) -> ReadingOptions:
-    """Options of the command line as the reader's.
+@contextmanager
+def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) -> Generator[OpenMotion]:
+    """Open a file and plan it as it is read; where it tells the time itself, replay it.
 
     Raises
     ------
-    OptionError
-        An unknown dialect or way of joining way-points.
+    ProgramError
+        What is wrong with the file, at once or while the blocks are drawn.
+    InfeasibleError
+        While the blocks are drawn: what no motion can satisfy.
     """
-    known = {"auto": None, **{member.value: member for member in Dialect}}
-    if dialect not in known:
-        raise OptionError(f"unknown dialect {dialect!r}", hint="there are " + ", ".join(known))
-    curves = {member.value: member for member in Curve}
-    if path not in curves:
-        raise OptionError(f"--path is {' or '.join(curves)}, not {path!r}")
-    gcode = GcodeOptions(dialect=known[dialect], block_delete=block_delete, tools=setup.tools)
-    return ReadingOptions(gcode=gcode, curve=curves[path], closed=closed)
-
-
-@contextmanager
-def open_motion(path: str, setup: Setup, options: ReadingOptions) -> Generator[OpenMotion]:
-    """Open a program or table, and plan it (or, where it tells the time itself, replay it) as it is read."""
     period = setup.control.sample_time
+    options = options or ReadingOptions()
     with reading(path, options) as opened:
-        motion = OpenMotion(
-            "stdin" if path == STANDARD_INPUT else Path(path).name, opened.source, setup, iter(())
-        )
+        name = "stdin" if path == STANDARD_INPUT else Path(path).name
+        motion = OpenMotion(name, opened.source, setup, iter(()))
         if opened.timed is not None:
             command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
             blocks = replaying(command, toolpath)
@@ -89,13 +75,6 @@ def digest(path: str) -> str:
         return "-"
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def warn(warnings: Iterable[str], *, quiet: bool) -> None:
-    """Print warnings on stderr, one line each."""
-    if not quiet:
-        for warning in warnings:
-            sys.stderr.write(one_line(warning) + "\n")
 
 
 def _noted(chunks: Iterable[Program], notes: list[Note]) -> Iterator[Program]:

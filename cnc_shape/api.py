@@ -1,0 +1,76 @@
+"""The commands as functions: a program through the whole chain, its report, its picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cnc_shape.config.dump import dump_machine
+from cnc_shape.config.setup import Setup, Shaping
+from cnc_shape.opening import digest, open_motion
+from cnc_shape.pipeline import Run, default_cases, pick_cases, run
+from cnc_shape.readers import ReadingOptions
+from cnc_shape.report import folder as run_folder
+from cnc_shape.report.figures import Format, path_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def simulate_program(
+    path: str | Path,
+    setup: Setup,
+    cases: Sequence[str] | None = None,
+    options: ReadingOptions | None = None,
+    *,
+    record: bool = True,
+) -> Run:
+    """Send a program through a machine, case by case.
+
+    Parameters
+    ----------
+    path
+        G-code or CSV.
+    setup
+        The machine, from `load_machine`.
+    cases
+        Rows of the table; None: the machine's own.
+    options
+        How to read the file.
+    record
+        Keep the signals for a report.
+    """
+    picked = default_cases(setup) if cases is None else pick_cases(setup, cases)
+    with open_motion(str(path), setup, options) as motion:
+        return run(motion.blocks, setup, picked, motion.name, record=record)
+
+
+def report_context(
+    inputs: Sequence[str],
+    setup: Setup,
+    command: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+    figure_format: Format = "svg",
+) -> run_folder.Context:
+    """What a run folder says about where its run came from."""
+    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
+    return run_folder.Context(
+        command=command,
+        inputs={Path(path).name: digest(path) for path in inputs},
+        machine=dump_machine(setup),
+        shapers=shapers,
+        modes={axis.name: axis.modes for axis in setup.machine.axes},
+        warnings=warnings,
+        figure_format=figure_format,
+    )
+
+
+def write_report(run: Run, folder: str | Path, setup: Setup, *, force: bool = False) -> Path:
+    """Write the run folder of a recorded run; returns the path of its page."""
+    return run_folder.write_report(run, Path(folder), report_context([], setup), force=force)
+
+
+def plot(run: Run) -> Figure:
+    """Draw the programmed path and every case's tool, contour error magnified."""
+    return path_figure(run)

@@ -1,0 +1,196 @@
+"""``cnc-shape check``: read and validate programs, tables and machine files, and say what they hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Json, PathStyle, Quiet
+
+if TYPE_CHECKING:
+    from cnc_shape.census import Census
+    from cnc_shape.readers import Reading, ReadingOptions
+
+MACHINE_SUFFIXES = (".yaml", ".yml")
+
+
+def check(
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE…", help="G-code, CSV or machine files; - for stdin.")
+    ],
+    machine: Annotated[
+        str | None,
+        typer.Option("-m", "--machine", envvar="CNC_SHAPE_MACHINE", help="Machine file with the tool table."),
+    ] = None,
+    points: Annotated[
+        str | None, typer.Option(metavar="OUT.npz", help="Write the programmed moves of one file as arrays.")
+    ] = None,
+    dialect: Dialect = "auto",
+    block_delete: BlockDelete = False,
+    path: PathStyle = "polyline",
+    closed: Closed = False,
+    max_blocks: Annotated[
+        int | None, typer.Option(help="Most blocks that are executed.", show_default="20 M")
+    ] = None,
+    max_file_bytes: Annotated[int | None, typer.Option(help="Largest file.", show_default="256 MiB")] = None,
+    max_line_bytes: Annotated[int | None, typer.Option(help="Longest line.", show_default="64 KiB")] = None,
+    max_coordinate_mm: Annotated[
+        float | None, typer.Option(help="Largest coordinate.", show_default="1e6")
+    ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> int:
+    """Read and validate files: what they count, how long they are, how far they reach."""
+    from cnc_shape.cli.errors import DONE, WRONG_INPUT, error_object, report_error
+    from cnc_shape.cli.output import print_json
+    from cnc_shape.cli.reading import limited, named_options
+    from cnc_shape.errors import CncShapeError
+
+    tools = _tools(machine)
+    options = limited(
+        named_options(dialect, path, tools, block_delete=block_delete, closed=closed),
+        blocks=max_blocks,
+        file_bytes=max_file_bytes,
+        line_bytes=max_line_bytes,
+        coordinate=max_coordinate_mm,
+    )
+    _one_target(files, points)
+    results: list[dict[str, Any]] = []
+    status = DONE
+    for file in files:
+        try:
+            result = _check(file, options, points)
+        except CncShapeError as error:
+            if len(files) == 1:
+                raise
+            report_error(error, json=False)
+            results.append({"file": file, "error": error_object(error)})
+            status = WRONG_INPUT
+            continue
+        results.append(result)
+        if not json:
+            _show(result, quiet=quiet)
+    if json:
+        print_json("check", results[0] if len(files) == 1 else {"files": results})
+    return status
+
+
+def _tools(machine: str | None) -> Any:
+    if machine is None:
+        return ()
+    from cnc_shape.config.machine_file import load_machine
+
+    return load_machine(machine).tools
+
+
+def _one_target(files: list[str], points: str | None) -> None:
+    from cnc_shape.errors import OptionError
+
+    if points is None:
+        return
+    if len(files) > 1 or Path(files[0]).suffix.lower() in MACHINE_SUFFIXES:
+        raise OptionError("--points takes one program", hint="check one file at a time")
+    if Path(points).exists() and Path(files[0]).exists() and Path(points).samefile(files[0]):
+        raise OptionError(
+            f"{points} is the input itself", hint="name another output: inputs are never overwritten"
+        )
+
+
+def _check(file: str, options: ReadingOptions, points: str | None) -> dict[str, Any]:
+    if Path(file).suffix.lower() in MACHINE_SUFFIXES:
+        from cnc_shape.config.check import check_machine
+
+        return check_machine(file)
+    from cnc_shape.census import count
+    from cnc_shape.readers import reading
+    from cnc_shape.writers.points import points_file, points_of
+    from cnc_shape.writers.publish import publish
+
+    with reading(file, options) as opened:
+        census, rows = None, []
+        for chunk in opened.chunks:
+            census = count(census, chunk)
+            if points is not None:
+                rows.append(points_of(chunk))
+        assert census is not None  # a reader yields one chunk at least
+        if points is not None:
+            publish(points, points_file(rows), force=True)
+        return _result(opened, census)
+
+
+def _result(opened: Reading, census: Census) -> dict[str, Any]:
+    from cnc_shape.program import ROTARY
+    from cnc_shape.units import DEGREE
+
+    empty = not census.low[0] <= census.high[0]
+    return {
+        "file": opened.source,
+        "dialect": opened.dialect,
+        "dialect_evidence": opened.evidence,
+        "lines": opened.lines,
+        "moves": {
+            "rapid": census.rapids, "feed": census.feeds, "arc": census.arcs, "spline": 0, "probe": 0, "tap": 0,
+            "dwell": census.dwells,
+        },
+        "rapid_length_mm": census.rapid_length,
+        "feed_length_mm": census.feed_length,
+        "feed_time_s": census.feed_time,
+        "dwell_s": census.dwell,
+        "bounds_mm": {
+            "min": None if empty else census.low.tolist(),
+            "max": None if empty else census.high.tolist(),
+        },
+        "final_position": {
+            axis: float(value) / (DEGREE if axis in ROTARY else 1.0)
+            for axis, value in zip(census.axes, census.position, strict=True)
+        },
+        "warnings": [{"line": note.line, "message": note.message} for note in census.notes],
+    }  # fmt: skip
+
+
+def _show(result: dict[str, Any], *, quiet: bool) -> None:
+    """Print a result for the eye; warnings go to stderr."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from cnc_shape.cli.output import print_error
+
+    table = Table(title=Text(result["file"], style="bold"), title_justify="left", show_header=False, box=None)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in _facts(result):
+        table.add_row(Text(name), Text(value))
+    Console(highlight=False).print(table)
+    if not quiet:
+        for warning in result["warnings"]:
+            print_error(f"{result['file']}:{warning['line']}: warning: {warning['message']}")
+
+
+def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
+    if result["dialect"] == "machine":
+        modes = ", ".join(f"{axis.upper()} {count}" for axis, count in result["modes"].items())
+        shapers = ", ".join(f"{axis.upper()} {entry['type']}" for axis, entry in result["shapers"].items())
+        return [("machine", result["name"]), ("modes", modes or "none"), ("shapers", shapers or "none")]
+    because = f" ({result['dialect_evidence']})" if result["dialect_evidence"] else ""
+    moves = ", ".join(f"{count} {name}" for name, count in result["moves"].items() if count) or "none"
+    low, high = result["bounds_mm"]["min"], result["bounds_mm"]["max"]
+    bounds = [f"{axis} {a:.3f} … {b:.3f}" for axis, a, b in zip("XYZ", low, high, strict=True)] if low else []
+    return [
+        ("dialect", result["dialect"] + because),
+        ("lines", f"{result['lines']}"),
+        ("moves", moves),
+        ("rapids", f"{result['rapid_length_mm']:.3f} mm"),
+        (
+            "feeds",
+            f"{result['feed_length_mm']:.3f} mm in {result['feed_time_s']:.3f} s at the programmed feed",
+        ),
+        ("dwells", f"{result['dwell_s']:.3f} s"),
+        ("bounds", "  ".join(bounds) + " mm" if bounds else "none"),
+        (
+            "ends at",
+            "  ".join(f"{axis.upper()} {value:.3f}" for axis, value in result["final_position"].items()),
+        ),
+    ]
