@@ -15,6 +15,7 @@ from runs import MODE, make_run, shaper
 
 from cnc_shape.arrays import frozen
 from cnc_shape.report import figures
+from cnc_shape.report.shaper_figure import shaper_figure
 
 RUN = make_run(2000)
 SHAPERS = {"x": shaper(), "y": shaper()}
@@ -113,8 +114,26 @@ def test_flat_and_empty_paths_are_drawn(shape):
 
 
 def test_axes_with_one_shaper_share_a_row():
-    assert len(figures.shaper_figure(SHAPERS, MODES).axes) == 2
+    assert len(shaper_figure(SHAPERS, MODES).axes) == 2
     other = {**SHAPERS, "z": replace(shaper(), times=frozen([0.0, 0.01]))}
-    assert len(figures.shaper_figure(other, {**MODES, "z": ()}).axes) == 4
-    first, second = (figures.render(figures.shaper_figure(SHAPERS, MODES), "svg") for _ in range(2))
+    assert len(shaper_figure(other, {**MODES, "z": ()}).axes) == 4
+    first, second = (figures.render(shaper_figure(SHAPERS, MODES), "svg") for _ in range(2))
     assert first == second
+
+
+def test_what_comes_to_rest_has_a_panel_where_it_was_recorded():
+    assert len(figures.vibration_figure(RUN).axes) == 2
+    late = [replace(case, cycle_time=1e3) for case in RUN.summary.cases]
+    run = replace(RUN, summary=replace(RUN.summary, cases=tuple(late)))
+    assert len(figures.vibration_figure(run).axes) == 1
+
+
+def test_no_title_of_a_path_is_cut():
+    for case in ("shaped", "shaped+cross_coupled+disturbance_observer"):
+        flat = [replace(s, case=case, tool=s.tool * [1.0, 0.6, 1.0]) for s in RUN.signals]
+        figure = figures.path_figure(
+            replace(RUN, path=frozen(RUN.path * [1.0, 0.6, 1.0]), signals=tuple(flat))
+        )
+        figure.canvas.draw()
+        for ax in figure.axes:
+            assert ax.title.get_window_extent().y1 <= figure.bbox.y1

@@ -24,8 +24,8 @@ from cnc_shape.report.words import verdict
 RUN = make_run(600)
 TAGS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "section", "p", "h1", "h2", "dl",
-    "div", "dt", "dd", "table", "thead", "tbody", "tr", "th", "td", "small", "figure", "img", "figcaption", "code",
-    "ul", "li", "details", "summary", "pre", "footer",
+    "div", "dt", "dd", "table", "thead", "tbody", "tr", "th", "td", "small", "figure", "img", "figcaption",
+    "code", "ul", "li", "details", "summary", "pre", "footer",
 }  # fmt: skip
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 QUIET = (

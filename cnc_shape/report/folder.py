@@ -24,6 +24,7 @@ from cnc_shape.program import ROTARY
 from cnc_shape.recording import Signals
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.table import summary_json, tables_csv
 from cnc_shape.shapers import Shaper
 from cnc_shape.units import DEGREE
@@ -149,7 +150,7 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
         "vibration": figures.vibration_figure(run),
     }
     if context.shapers:
-        drawn["shapers"] = figures.shaper_figure(context.shapers, context.modes)
+        drawn["shapers"] = shaper_figure(context.shapers, context.modes)
     return drawn
 
 
