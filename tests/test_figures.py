@@ -121,11 +121,12 @@ def test_axes_with_one_shaper_share_a_row():
     assert first == second
 
 
-def test_what_comes_to_rest_has_a_panel_where_it_was_recorded():
-    assert len(figures.vibration_figure(RUN).axes) == 2
-    late = [replace(case, cycle_time=1e3) for case in RUN.summary.cases]
-    run = replace(RUN, summary=replace(RUN.summary, cases=tuple(late)))
-    assert len(figures.vibration_figure(run).axes) == 1
+def test_what_the_structure_does_after_the_end_is_drawn_and_may_be_nothing():
+    rest = figures.vibration_figure(RUN).axes[1]
+    for line, signals in zip(rest.lines, RUN.signals, strict=True):
+        assert np.max(np.abs(line.get_ydata())) in np.abs(signals.settling).max(axis=0) / 1e-3
+    still = [replace(s, settling_time=frozen([]), settling=frozen(np.zeros((0, 3)))) for s in RUN.signals]
+    assert figures.render(figures.vibration_figure(replace(RUN, signals=tuple(still))), "png")
 
 
 def test_no_title_of_a_path_is_cut():

@@ -84,6 +84,7 @@ def test_signals_hold_every_sample_time_first_with_units(written):
             assert_array_equal(signals[f"{case.case}/acceleration_x_mm_s2"], case.acceleration[:, 0])
             assert_array_equal(signals[f"{case.case}/tool_contour_error_mm"], case.tool_error)
             assert_array_equal(signals[f"{case.case}/line"], case.line)
+            assert_array_equal(signals[f"{case.case}/settling_x_mm"], case.settling[:, 0])
 
 
 def test_run_json_names_inputs_versions_and_command(written):
@@ -125,12 +126,12 @@ def test_an_older_folder_needs_force(tmp_path, quick):
     assert content(tmp_path / "run") == before
 
 
-@pytest.mark.parametrize("name", ["tool", "velocity", "drive_error", "time", "foot"])
+@pytest.mark.parametrize("name", ["tool", "velocity", "drive_error", "time", "foot", "settling"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_signal_that_is_not_finite_is_named_with_its_time_and_nothing_is_written(tmp_path, name, value):
     shaped = RUN.signal("shaped")
     values = getattr(shaped, name).copy()
-    values[100] = value
+    values[60] = value
     bad = replace(shaped, **{name: frozen(values)})
     with pytest.raises(InfeasibleError, match=rf"{name}.* of the case shaped is {value} at t = "):
         write_report(replace(RUN, signals=(RUN.signals[0], bad, RUN.signals[2])), tmp_path / "run", CONTEXT)

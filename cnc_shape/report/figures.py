@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 Format = Literal["svg", "png", "pdf"]
-SHOWN_AT_REST = 10  # samples after the end of the command from which on they get a panel of their own
 PANELS = 3  # paths side by side at most
 DRAWN = 1_000  # buckets of a line over time; the worst and the best of each is drawn
 DRAWN_PATH = 20_000  # points of a path that are drawn
@@ -189,26 +188,23 @@ def vibration_figure(run: Run) -> Figure:
         max(np.abs(s.tool[:, k] - s.position[:, k]).max(initial=0.0) for s in run.signals) for k in linear
     ]
     axis = linear[int(np.argmax(largest))]
-    end = max(case.cycle_time for case in run.summary.cases)
-    rests = max(int((s.time >= end).sum()) for s in run.signals) >= SHOWN_AT_REST
-    figure, axes = new_figure(WIDTH, 2.8, 1, 2 if rests else 1)
+    figure, (whole, rest) = new_figure(WIDTH, 2.8, 1, 2)
     for k, signals in enumerate(run.signals):
         values = (signals.tool[:, axis] - signals.position[:, axis]) / MICROMETRE
         rows = worst_rows(values)
-        axes[0].plot(signals.time[rows], values[rows], **look(k), label=signals.case)
-        if rests:
-            after = np.flatnonzero(signals.time >= end)
-            rows = after[worst_rows(values[after])]
-            axes[1].plot(signals.time[rows] - end, values[rows], **look(k))
-    axes[0].set_title(f"Deflection in {run.signals[0].axes[axis].upper()}: tool minus drive")
-    axes[0].set_ylabel("deflection (µm)")
-    axes[0].set_xlabel("time (s)")
-    if rests:
-        axes[1].set_title("After the command has come to rest")
-        axes[1].set_xlabel("time after the end (s)")
-    for ax in axes:
+        whole.plot(signals.time[rows], values[rows], **look(k), label=signals.case)
+        after = signals.settling[:, axis] / MICROMETRE
+        rows = worst_rows(after)
+        rest.plot(signals.settling_time[rows], after[rows], **look(k))
+    name = run.signals[0].axes[axis].upper()
+    whole.set_title(f"Deflection in {name}: tool minus drive")
+    whole.set_ylabel("deflection (µm)")
+    whole.set_xlabel("time (s)")
+    rest.set_title("After the command has come to rest")
+    rest.set_xlabel("time after the end (s)")
+    for ax in (whole, rest):
         ax.margins(x=0.0)
-    _legend(figure, axes[0])
+    _legend(figure, whole)
     return figure
 
 

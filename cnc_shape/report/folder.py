@@ -134,7 +134,8 @@ def _check(signals: Signals, name: str, values: FloatArray) -> None:
     if bad.size:
         row, *column = bad[0].tolist()
         axis = f" of {signals.axes[column[0]].upper()}" if column else ""
-        value, time = values[row, *column], signals.time[row]
+        settling = name.startswith("settling")
+        value, time = values[row, *column], (signals.settling_time if settling else signals.time)[row]
         raise InfeasibleError(
             f"{name}{axis} of the case {signals.case} is {value} at t = {time:.6g} s",
             hint="the motion ran away: lower the gains of its loop, or check its shapers",
@@ -171,6 +172,10 @@ def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any]]:
                 rotary = axis in ROTARY
                 scale = 1.0 / DEGREE if rotary else 1.0
                 arrays[f"{stem}/{name}_{axis}_{'deg' if rotary else 'mm'}{unit}"] = values[:, k] * scale
+        arrays[f"{stem}/settling_time_s"] = case.settling_time  # after the end of the motion
+        for k, axis in enumerate(case.axes):
+            scale, unit = (1.0 / DEGREE, "deg") if axis in ROTARY else (1.0, "mm")
+            arrays[f"{stem}/settling_{axis}_{unit}"] = case.settling[:, k] * scale
         arrays[f"{stem}/command_contour_error_mm"] = case.command_error
         arrays[f"{stem}/contour_error_mm"] = case.drive_error
         arrays[f"{stem}/tool_contour_error_mm"] = case.tool_error
