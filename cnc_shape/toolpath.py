@@ -10,7 +10,8 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.program import Motion, Program
+from cnc_shape.program import ROTARY, Motion, Program
+from cnc_shape.units import DEGREE
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -121,7 +122,7 @@ def build_toolpath(program: Program, arc_length: float = 0.0) -> Toolpath:
     """
     length = travel_lengths(program)
     start = _starts(program)
-    moves = (length > 0.0) | (program.target != start).any(axis=1)
+    moves = (length > 0.0) | (rotary_travel(program) > 0.0)
     keep = np.flatnonzero(moves | (program.motion == Motion.DWELL))
     return Toolpath(
         source=program.source,
@@ -229,10 +230,12 @@ def check_travel(program: Program, travel: Mapping[str, tuple[float, float]]) ->
         outside = np.flatnonzero((low[:, column] < lower - 1e-9) | (high[:, column] > upper + 1e-9))
         if outside.size:
             row = int(outside[0])
-            reached = low[row, column] if low[row, column] < lower else high[row, column]
+            reached = low[row, column] if low[row, column] < lower - 1e-9 else high[row, column]
+            unit, key, scale = ("°", "travel_deg", DEGREE) if axis in ROTARY else (" mm", "travel_mm", 1.0)
             raise InfeasibleError(
-                f"{axis.upper()} reaches {reached:.6g} mm, beyond its travel of {lower:g} to {upper:g} mm",
-                hint="move the part, or widen the axis's travel_mm in the machine file",
+                f"{axis.upper()} reaches {reached / scale:.6g}{unit}, "
+                f"beyond its travel of {lower / scale:g} to {upper / scale:g}{unit}",
+                hint=f"move the part, or widen the axis's {key} in the machine file",
                 source=program.source,
                 line=int(program.line[row]),
             )

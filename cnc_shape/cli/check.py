@@ -109,7 +109,8 @@ def _check(file: str, options: ReadingOptions, points: str | None) -> dict[str, 
     from cnc_shape.writers.publish import publish
 
     with reading(file, options) as opened:
-        census, rows = None, []
+        census: Census | None = None
+        rows: list[dict[str, Any]] = []
         for chunk in opened.chunks:
             census = count(census, chunk)
             if points is not None:
@@ -131,8 +132,8 @@ def _result(opened: Reading, census: Census) -> dict[str, Any]:
         "dialect_evidence": opened.evidence,
         "lines": opened.lines,
         "moves": {
-            "rapid": census.rapids, "feed": census.feeds, "arc": census.arcs, "spline": 0, "probe": 0, "tap": 0,
-            "dwell": census.dwells,
+            "rapid": census.rapids, "feed": census.feeds, "arc": census.arcs,
+            "spline": 0, "probe": 0, "tap": 0, "dwell": census.dwells,
         },
         "rapid_length_mm": census.rapid_length,
         "feed_length_mm": census.feed_length,

@@ -52,23 +52,30 @@ def open_source(path: str | Path, limits: ReadingLimits) -> Generator[Source]:
         No such file, a folder, no permission, empty, UTF-16, or beyond ``limits.file_bytes``.
     """
     name = "<stdin>" if str(path) == STANDARD_INPUT else str(path)
+    with _faults(name):
+        handle = sys.stdin.buffer if str(path) == STANDARD_INPUT else open(path, "rb")  # noqa: SIM115
     try:
-        handle = sys.stdin.buffer if str(path) == STANDARD_INPUT else open(path, "rb")  # noqa: SIM115  # closed below
-    except (OSError, ValueError) as error:
-        detail = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ProgramError(
-            name, None, None, f"cannot read: {detail.lower()}", hint="check the file's name"
-        ) from error
-    try:
-        yield Source(name, _seekable(name, handle, limits), limits)
-    except OSError as error:
-        detail = (error.strerror or str(error)).lower()
-        raise ProgramError(
-            name, None, None, f"cannot read: {detail}", hint="check the file's name"
-        ) from error
+        with _faults(name):
+            stream = _seekable(name, handle, limits)
+        yield Source(name, stream, limits)
     finally:
         if handle is not sys.stdin.buffer:
             handle.close()
+
+
+@contextmanager
+def _faults(name: str) -> Generator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        detail = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        reason = f"cannot read: {detail.lower()}"
+        raise ProgramError(name, None, None, reason, hint="check the file's name") from error
+
+
+def _read(source: Source, size: int) -> bytes:
+    with _faults(source.name):
+        return source.stream.read(size)
 
 
 def _seekable(name: str, handle: BinaryIO, limits: ReadingLimits) -> BinaryIO:
@@ -96,8 +103,8 @@ def blocks(source: Source) -> Iterator[bytes]:
     source.stream.seek(0)
     rest = b""
     first = True
-    while piece := source.stream.read(BLOCK_BYTES):
-        while piece.endswith(b"\r") and (more := source.stream.read(1)):
+    while piece := _read(source, BLOCK_BYTES):
+        while piece.endswith(b"\r") and (more := _read(source, 1)):
             piece += more  # never part CR from LF
         if first:
             piece, first = piece.removeprefix(UTF8_MARK), False

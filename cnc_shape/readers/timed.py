@@ -14,6 +14,8 @@ from cnc_shape.readers.table import TIME, Header, read_rows
 from cnc_shape.readers.waypoints import polyline, positions
 from cnc_shape.toolpath import rotary_travel, travel_lengths
 
+SHORTEST = 1e-9  # s, between two rows
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TimedPoints:
@@ -38,8 +40,8 @@ def read_timed_points(source: Source, header: Header) -> TimedPoints:
     numbers: list[int] = []
     clock = header.names.index(TIME)
     for number, values in read_rows(source, header):
-        if kept and values[clock] <= kept[-1][clock]:
-            way = "stands still" if values[clock] == kept[-1][clock] else "runs backwards"
+        if kept and values[clock] < kept[-1][clock] + SHORTEST:
+            way = "runs backwards" if values[clock] < kept[-1][clock] else "stands still"
             raise ProgramError(
                 source.name, number, 1, f"time {way} at {values[clock]:g} s", hint="rows are in order of time"
             )

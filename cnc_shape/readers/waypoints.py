@@ -15,6 +15,8 @@ from cnc_shape.readers.table import FEED, Header, read_rows
 from cnc_shape.toolpath import rotary_travel, travel_lengths
 from cnc_shape.units import DEGREE
 
+SLOWEST = 1e-8  # mm/s, of a way-point's feed
+
 
 def positions(header: Header, table: FloatArray) -> FloatArray:
     """Columns of the axes in order, (n,d) mm or rad; an axis the table lacks stays at 0."""
@@ -65,7 +67,7 @@ def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -
     Raises
     ------
     ProgramError
-        As `read_rows`; a feed that is not positive; fewer than two way-points.
+        As `read_rows`; a feed that is not positive or next to nothing; fewer than two way-points.
     """
     kept: list[list[float]] = []
     numbers: list[int] = []
@@ -74,10 +76,9 @@ def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -
     note = () if feed is not None else (Note(1, "no column feed_mm_min: the axes go as fast as they can"),)
     found = handed = 0
     for number, values in read_rows(source, header):
-        if feed is not None and values[feed] <= 0.0:
-            raise ProgramError(
-                source.name, number, 1, "the feed is not positive", hint="give the feed of the move"
-            )
+        if feed is not None and values[feed] < SLOWEST:
+            reason = f"the feed is below the limit of {SLOWEST:g} mm/s"
+            raise ProgramError(source.name, number, 1, reason, hint="give the feed of the move")
         first = first or (number, values)
         kept.append(values)
         numbers.append(number)

@@ -14,6 +14,7 @@ from cnc_shape.readers.gcode.codes import (
     PROGRAM_ENDS,
     REFUSED,
     SET_TOOL,
+    SMOOTHNESS,
     name_of,
 )
 from cnc_shape.readers.gcode.dialects import Dialect
@@ -55,7 +56,7 @@ def read_block(pairs: list[tuple[str, str]], dialect: Dialect) -> Block:
         elif letter == "M":
             _add_m(value, number, m, dialect)
         elif letter == "N":
-            if place:
+            if place or value < 0.0:
                 raise BlockError("N stands at the beginning of a line only", hint="move it there", letter="N")
         elif letter in words:
             raise BlockError(f"two {letter} words on one line", hint="keep one of them", letter=letter)
@@ -69,7 +70,12 @@ def read_block(pairs: list[tuple[str, str]], dialect: Dialect) -> Block:
             words["O"] = value
         else:
             words[letter] = value
-    if "E" in words and dialect is not Dialect.MARLIN and not {66, 67, 68} & set(m):
+    if (
+        "E" in words
+        and dialect is not Dialect.MARLIN
+        and not {66, 67, 68} & set(m)
+        and SMOOTHNESS not in g.values()
+    ):
         raise BlockError(
             "an E word: only 3D printers have it",
             hint="exponents are not numbers of G-code; for a printer's program use --dialect marlin",
@@ -83,7 +89,7 @@ def _add_g(value: float, number: str, g: dict[str, int], dialect: Dialect) -> No
     group = GROUP_OF.get(code)
     if abs(value * 10.0 - code) > 1e-6 or (
         (group is None and code not in NOT_YET and code not in REFUSED)
-        or (code == 1870 and dialect is not Dialect.FANUC)
+        or (code == SMOOTHNESS and dialect is not Dialect.FANUC)
     ):
         raise BlockError(
             f"unknown code G{number}", hint="see the list of codes that are read", letter=f"G{number}"
@@ -92,14 +98,8 @@ def _add_g(value: float, number: str, g: dict[str, int], dialect: Dialect) -> No
         reason, hint = REFUSED[code]
         raise BlockError(reason, hint=hint, letter=name_of(code))
     if group is None or (code in NOT_YET and dialect is not Dialect.MARLIN):
-        reason, hint = NOT_YET[code]
-        raise BlockError(
-            f"{name_of(code)}: {reason} are not built yet"
-            if reason.endswith("s")
-            else f"{name_of(code)}: {reason} is not built yet",
-            hint=hint,
-            letter=name_of(code),
-        )
+        what, hint = NOT_YET[code]
+        raise BlockError(f"{name_of(code)} ({what}) is not built yet", hint=hint, letter=name_of(code))
     if group in g:
         other = name_of(g[group])
         raise BlockError(
@@ -118,8 +118,8 @@ def _add_m(value: float, number: str, m: list[int], dialect: Dialect) -> None:
             f"unknown code M{number}", hint="see the list of codes that are read", letter=f"M{number}"
         )
     if code in M_NOT_YET:
-        reason, hint = M_NOT_YET[code]
-        raise BlockError(f"M{code}: {reason} is not built yet", hint=hint, letter=f"M{code}")
+        what, hint = M_NOT_YET[code]
+        raise BlockError(f"M{code} ({what}) is not built yet", hint=hint, letter=f"M{code}")
     group = M_GROUP_OF.get(code)
     for other in m:
         if other == code or (group is not None and M_GROUP_OF.get(other) == group):

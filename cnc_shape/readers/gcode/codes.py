@@ -57,13 +57,13 @@ NOT_YET: dict[int, tuple[str, str]] = {
     **dict.fromkeys((730, *range(810, 900, 10)), (_CYCLES, "expand the cycle into G0 and G1 moves")),
     **dict.fromkeys((382, 383, 384, 385), (_PROBING, "replace the probing move by G1")),
     **dict.fromkeys((410, 411, 420, 421), (_COMPENSATION, "program the path of the tool's centre")),
-    100: ("setting offsets (G10)", "use G54 without offsets"),
-    280: ("homing (G28)", "replace it by G0 to the point"),
-    281: ("storing the home point (G28.1)", "take it away"),
-    300: ("homing (G30)", "replace it by G0 to the point"),
-    301: ("storing the second home point (G30.1)", "take it away"),
-    520: ("local offsets (G52)", "use G92"),
-    960: ("constant surface speed (G96)", "give the spindle speed with G97 S"),
+    100: ("setting offsets", "use G54 without offsets"),
+    280: ("homing", "replace it by G0 to the point"),
+    281: ("storing the home point", "take it away"),
+    300: ("homing", "replace it by G0 to the point"),
+    301: ("storing the second home point", "take it away"),
+    520: ("local offsets", "use G92"),
+    960: ("constant surface speed", "give the spindle speed with G97 S"),
     **dict.fromkeys((171, 181, 191), ("planes of U, V and W", "use G17, G18 or G19")),
 }
 REFUSED: dict[int, tuple[str, str]] = dict.fromkeys(
@@ -87,8 +87,15 @@ IGNORED: dict[int, str] = {
     **dict.fromkeys((428, 429, 430), "kinematics switches"),
 }
 M_NOT_YET: dict[int, tuple[str, str]] = {
-    **dict.fromkeys((70, 71, 72, 73), ("saving the modal state (M70 to M73)", "write the modes out")),
-    **dict.fromkeys((97, 98, 99), ("subroutines (M97, M98, M99)", "unroll the program")),
+    **dict.fromkeys((70, 71, 72, 73), ("saving the modal state", "write the modes out")),
+    **dict.fromkeys((97, 98, 99), ("subroutines", "unroll the program")),
+}
+M_WORDS: dict[int, str] = {  # words that belong to an M code
+    19: "PQR",
+    **dict.fromkeys((50, 51, 52, 53, 62, 63, 64, 65), "P"),
+    66: "PELQ",
+    **dict.fromkeys((67, 68), "EQ"),
+    **dict.fromkeys(range(100, 200), "PQ"),
 }
 _M_GROUPS = (
     (0, 1, 2, 30, 60, 99), (6, 61), (3, 4, 5, 19), (7, 8), (9,), (48, 49), (62, 63, 64, 65, 66, 67, 68),

@@ -39,10 +39,12 @@ _PRINTER_CODES = re.compile(
 )
 _GRBL_SETTING = re.compile(rb"(?m)^[ \t]*\$")
 _FANUC_HEAD = re.compile(rb"(?i)\A\s*%[^\n]*\s*[O:][ \t]*[0-9]+[ \t]*(?:\([^\n]*)?(?:\n|\Z)")
-_ROTARY_WORD = {  # on lines that do not begin with a printer's M code or macro
+_ROTARY_WORD = {
+    axis: re.compile(rb"(?m)(?:^|[^A-Z_<])%s[ \t]*[-+.0-9\[#]" % axis.upper().encode()) for axis in ROTARY
+}
+_ROTARY_MOVE = {  # the same on lines that do not begin with a printer's M code or macro
     axis: re.compile(
-        rb"(?m)^(?![ \t]*(?:M[0-9]{3}|[A-Z_]{2}))(?:[^\n]*?[^A-Z_<\n])??%s[ \t]*[-+.0-9\[#]"
-        % axis.upper().encode()
+        rb"(?m)^(?![ \t]*(?:M[0-9]|[A-Z_]{2}))(?:[^\n]*?[^A-Z_<\n])??%s[ \t]*[-+.0-9]" % axis.upper().encode()
     )
     for axis in ROTARY
 }
@@ -58,7 +60,7 @@ def survey(source: Source, dialect: Dialect | None) -> Survey:
     printer = None
     setting = False
     count = 0
-    letters = set[str]()
+    words_seen, moves_seen = set[str](), set[str]()
     for block in blocks(source):
         head = head or block[: 1 << 16]
         count += block.count(b"\n") + (not block.endswith(b"\n"))
@@ -66,12 +68,14 @@ def survey(source: Source, dialect: Dialect | None) -> Survey:
         printer = printer or _PRINTER_CODES.search(words)
         setting = setting or _GRBL_SETTING.search(words) is not None
         words = words.upper()
-        letters |= {axis for axis in ROTARY if axis not in letters and _ROTARY_WORD[axis].search(words)}
+        words_seen |= {axis for axis in ROTARY if axis not in words_seen and _ROTARY_WORD[axis].search(words)}
+        moves_seen |= {axis for axis in words_seen - moves_seen if _ROTARY_MOVE[axis].search(words)}
     if dialect is None:
         dialect, evidence = _judge(head, printer, setting)
     else:
         evidence = "as asked for"
-    return Survey(dialect, evidence, XYZ + tuple(axis for axis in ROTARY if axis in letters), count)
+    rotary = moves_seen if dialect is Dialect.MARLIN else words_seen
+    return Survey(dialect, evidence, XYZ + tuple(axis for axis in ROTARY if axis in rotary), count)
 
 
 def _judge(head: bytes, printer: re.Match[bytes] | None, setting: bool) -> tuple[Dialect, str]:

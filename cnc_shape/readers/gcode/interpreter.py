@@ -72,6 +72,8 @@ class Interpreter:
 
     def execute(self, line: str) -> None:
         """Carry out one line in the readable way."""
+        if self.dialect is Dialect.MARLIN and printer.is_ignored(line, self.remark):
+            return
         text = compact(line)
         if text.startswith("%"):
             self._percent(text)
@@ -87,7 +89,7 @@ class Interpreter:
             text = text.translate({ord(char): None for char in "!~?"})
         elif self.dialect is Dialect.MARLIN:
             text = printer.without_checksum(text)
-            if printer.is_ignored(text, line, self.remark) or self._printer_moves(text):
+            if self._printer_moves(text):
                 return
         if not text:
             return
@@ -144,10 +146,10 @@ class Interpreter:
         if non_modal == codes.DWELL:
             pause = pause if printer_dwell else dwell(block, self.dialect)
             self.rows.rows.append(row_of(Motion.DWELL, self.line, modal, dwell=pause))
-        if non_modal == codes.SET_POSITION and self.dialect is Dialect.MARLIN and not set(AXES) & set(words):
-            g = block.g
-            del g[codes.NON_MODAL]  # G92 E0 counts filament
-            words.pop("E", None)
+        if non_modal == codes.SET_POSITION and self.dialect is Dialect.MARLIN:
+            words.pop("E", None)  # counts filament
+            if not set(AXES) & set(words):
+                del g[codes.NON_MODAL]
         if non_modal == codes.SMOOTHNESS:
             words.pop("P", None)
             words.pop("E", None)

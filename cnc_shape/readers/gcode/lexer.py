@@ -12,6 +12,7 @@ NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)"
 WORD = re.compile(f"([A-Z])({NUMBER})")
 WORDS = re.compile(f"(?:[A-Z]{NUMBER})*")
 
+_FOREIGN = re.compile(r"[^\x00-\x7f]")
 _COMMENT = re.compile(r"\([^()]*\)")
 _NOT_YET = {
     "[": ("expressions in brackets are not built yet", "write the number"),
@@ -56,6 +57,8 @@ def compact(text: str) -> str:
     """
     if "(" in text or ";" in text:
         text = strip_comments(text)
+    if not text.isascii():
+        text = _FOREIGN.sub("\x7f", text)  # some letters have an ASCII capital: they shall not pass as words
     return text.replace(" ", "").replace("\t", "").upper()
 
 
@@ -94,7 +97,7 @@ def diagnose(line: str) -> BlockError:
     `line` is the text as it stands in the file, comments included.
     """
     text = strip_comments(line)
-    upper = text.upper()
+    upper = _FOREIGN.sub("\x7f", text).upper()
     kept = [(column, char) for column, char in enumerate(upper, 1) if char not in " \t"]
     packed = "".join(char for _, char in kept)
     if re.match(r"BEGINPGM|[0-9]*BEGINPGM", packed):
@@ -125,7 +128,9 @@ def diagnose(line: str) -> BlockError:
         return BlockError(
             f"a number goes wrong at {char!a}", hint="a number has one decimal point", column=column
         )
-    return BlockError(f"bad character {char!a}", hint="only words such as X1.5 may stand here", column=column)
+    return BlockError(
+        f"bad character {text[column - 1]!a}", hint="only words such as X1.5 may stand here", column=column
+    )
 
 
 def _word_without_number(kept: list[tuple[int, str]], packed: str, at: int) -> BlockError:
@@ -143,7 +148,7 @@ def column_of(line: str, word: str) -> int | None:
 
     A full word is found as it is written or with leading zeros.
     """
-    text = strip_comments(line).upper()
+    text = _FOREIGN.sub("\x7f", strip_comments(line)).upper()
     if not word:
         return None
     if len(word) == 1:

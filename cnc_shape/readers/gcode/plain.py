@@ -9,6 +9,7 @@ from cnc_shape.program import Motion
 from cnc_shape.readers.gcode.codes import FEED, PER_MINUTE, RAPID
 from cnc_shape.readers.gcode.modal import Modal
 from cnc_shape.readers.gcode.rows import PER_TIME, Rows
+from cnc_shape.readers.gcode.settings import SLOWEST
 from cnc_shape.units import PER_MIN
 
 _NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))"
@@ -47,7 +48,7 @@ def take_plain_move(line: str, number: int, modal: Modal, rows: Rows, printer: b
             return False
         angular = float(early_feed or late_feed)  # pyright: ignore[reportArgumentType]  # one of them is there
         feed = angular * scale
-        if not 0.0 < angular < limit:
+        if not SLOWEST <= angular < limit:
             return False
     if x is None and y is None and z is None and a is None and e is None:
         return False

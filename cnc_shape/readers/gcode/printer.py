@@ -22,12 +22,14 @@ def without_checksum(text: str) -> str:
     return _CHECKSUM.sub("", text) if "*" in text else text
 
 
-def is_ignored(text: str, line: str, remark: Remark) -> bool:
-    """Whether a compacted line moves nothing: noted once per code; its arguments may be any text."""
+def is_ignored(line: str, remark: Remark) -> bool:
+    """Whether a line moves nothing: noted once per code; its arguments may be any text."""
+    head = line.partition(";")[0].upper()
+    text = head.replace(" ", "").replace("\t", "")
     if not text or _ENDS.match(text):
         return False
     if _MACRO.match(text):
-        name = line.split()[0].upper()
+        name = head.split()[0]
     elif found := _CODE.match(text) or _RETRACT_AND_LEVEL.match(text):
         name = found[1]
     else:

@@ -17,6 +17,7 @@ from cnc_shape.readers.gcode.modal import AXES, NAN, Modal
 from cnc_shape.tools import Tool
 from cnc_shape.units import MM_PER_INCH
 
+SLOWEST = 1e-6  # smallest F; below it a move would outlast the machine
 Remark = Callable[[str, str], None]  # key, message: noted once per key
 
 _PATH_MODES = {
@@ -44,6 +45,10 @@ def apply_before(block: Block, modal: Modal, remark: Remark) -> None:
         feed = words["F"]
         if feed < 0.0:
             raise BlockError(f"F {feed:g} is negative", hint="give a positive feed", letter="F")
+        if 0.0 < feed < SLOWEST:
+            raise BlockError(
+                f"F {feed:g} is below the limit of {SLOWEST:g}", hint="check the feed", letter="F"
+            )
         modal.feed = feed if mode == codes.INVERSE_TIME else feed * modal.millimetres
         modal.feed_angular = feed
     if "S" in words:
@@ -67,9 +72,8 @@ def _machine_code(code: int, block: Block, modal: Modal, remark: Remark) -> None
     elif code not in (codes.CHANGE_TOOL, *codes.PROGRAM_ENDS):
         purpose = codes.IGNORED.get(code, "machine functions")
         remark(purpose, f"M{code}: {purpose} are ignored")
-        for letter in "DELPQR" if code not in codes.PROGRAM_STOPS else "":
-            if not (letter == "R" and "R" in block.words and code != 19):
-                block.words.pop(letter, None)
+        for letter in codes.M_WORDS.get(code, ""):
+            block.words.pop(letter, None)
 
 
 def apply_after(block: Block, modal: Modal, tools: Mapping[int, Tool], remark: Remark) -> None:

@@ -1,0 +1,39 @@
+"""Programs for tests: text in, `Program` out, and what two programs have in common."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from cnc_shape.program import Program, concatenate
+from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
+from cnc_shape.readers.source import Source
+
+DEFAULT = GcodeOptions()
+COLUMNS = [name for name in Program.__slots__ if name not in ("source", "axes", "notes")]
+
+
+def chunks(text: str | bytes, options: GcodeOptions = DEFAULT, name: str = "part.nc") -> list[Program]:
+    """Read G-code from memory, as chunks."""
+    data = text.encode() if isinstance(text, str) else text
+    source = Source(name, io.BytesIO(data), options.limits)
+    return list(interpret(source, survey(source, options.dialect), options))
+
+
+def read(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program:
+    """Read G-code from memory."""
+    return concatenate(chunks(text, options))
+
+
+def assert_same(one: Program, other: Program, *, but: tuple[str, ...] = ()) -> None:
+    """Every column has the same bits."""
+    assert one.axes == other.axes
+    for name in COLUMNS:
+        if name not in but:
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+def messages(program: Program) -> list[str]:
+    """The warnings' texts."""
+    return [note.message for note in program.notes]
