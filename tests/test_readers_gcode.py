@@ -432,11 +432,38 @@ def test_machine_codes_are_noted_once_each_kind():
 
 # chunks, and the quick way
 
-SOME_WORDS = (
-    ["G0", "G1", "G01", "X1", "X-2.5", "Y3", "Z.5", "A45", "F100", "F200.5", "x 1", "N5", "(c)", "G4 P.1"]
-    + ["G91", "G90", "G20", "G21", "G93", "G94", "G92 X1", "G92.1", "G7", "G8", "G43.1 Z1", "G3 I2 J1"]
-    + ["G61", "G64 P.1"]
-)
+MOVES = [
+    "G0",
+    "G1",
+    "G01",
+    "X1",
+    "X-2.5",
+    "Y3",
+    "Z.5",
+    "A45",
+    "F100",
+    "F200.5",
+    "x 1",
+    "N5",
+    "(c)",
+    "G3 I2 J1",
+]
+MODES = [
+    "G91",
+    "G90",
+    "G20",
+    "G21",
+    "G93",
+    "G94",
+    "G92 X1",
+    "G92.1",
+    "G7",
+    "G8",
+    "G43.1 Z1",
+    "G61",
+    "G64 P.1",
+]
+SOME_WORDS = [*MOVES, *MODES, "G4 P.1"]
 WORDS = st.lists(st.sampled_from(SOME_WORDS), min_size=1, max_size=4)
 PROGRAMS = st.lists(WORDS.map(" ".join), min_size=1, max_size=25).map(
     lambda lines: "\n".join(["G1 F100 X0", *lines])
