@@ -205,9 +205,10 @@ def measuring(
         errors = tuple(_NOTHING for _ in waiting)
         if decided:
             errors = _measure([signal[:decided] for signal in waiting], path, *windows)
+        if samples:  # no later window begins before that of the next sample
+            following = float(places[min(decided, samples + back - 1)])
+            path = since(path, following - margin - BACKTRACK)
         places = places[decided : samples + back]
-        if places.size:
-            path = since(path, float(places[0]) - margin - BACKTRACK)
         return MeasuringState(path, places, tuple(signal[decided:] for signal in waiting)), errors
 
     return step

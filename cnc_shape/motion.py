@@ -16,10 +16,11 @@ from cnc_shape.feedrate import planning
 from cnc_shape.machine import Machine
 from cnc_shape.program import Program
 from cnc_shape.smoothing import Smoothing, smoothing
-from cnc_shape.toolpath import Toolpath, building, check_travel
+from cnc_shape.toolpath import Toolpath, building, check_travel, extent
 from cnc_shape.trajectory import Trajectory, sampling
 
 SAMPLES_PER_BLOCK = 65_536
+STILL = 1e-9  # mm or rad, an axis that moves no farther does not move
 
 T = TypeVar("T")
 
@@ -80,9 +81,8 @@ def moving(
             plan = planning(tuple(axis.limits for axis in machine.axes))
             moved = np.zeros(len(chunk.axes), dtype=np.bool_)
         check_travel(chunk, {axis.name: axis.limits.travel for axis in machine.axes})
-        if len(chunk):
-            moved |= (np.diff(np.vstack([chunk.start, chunk.target]), axis=0) != 0.0).any(axis=0)
-            moved[:3] |= (chunk.sweep != 0.0).any()
+        low, high = extent(chunk)
+        moved |= (high - low > STILL).any(axis=0)
         built, toolpath = build(built, chunk, last)
         smoothed, path = smooth(smoothed, toolpath, last)
         planned, profile = plan(planned, path, last)

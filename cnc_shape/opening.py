@@ -47,6 +47,8 @@ class OpenMotion:
 def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) -> Generator[OpenMotion]:
     """Open a file and plan it as it is read; where it tells the time itself, replay it.
 
+    Tool lengths are the machine's where `options` have none.
+
     Raises
     ------
     ProgramError
@@ -56,6 +58,8 @@ def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) 
     """
     period = setup.control.sample_time
     options = options or ReadingOptions()
+    if not options.gcode.tools:
+        options = replace(options, gcode=replace(options.gcode, tools=setup.tools))
     with reading(path, options) as opened:
         name = "stdin" if path == STANDARD_INPUT else Path(path).name
         motion = OpenMotion(name, opened.source, setup, iter(()))

@@ -191,6 +191,12 @@ class Trial:
         if block.last:
             self._cycle_time = block.cycle_time + self._longest
 
+    def signals(self) -> Signals | None:
+        """Samples kept for a report, if any were to be; call it after the last block."""
+        if self.recorder is None or self._simulated is None:
+            return None
+        return self.recorder.signals(self._simulated.settling)
+
     def summary(self) -> CaseSummary:
         """Scalars of the case; call it after the last block."""
         if self._simulated is None:
@@ -263,5 +269,5 @@ def run(
         program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
         tuple(trial.summary() for trial in trials),
     )  # fmt: skip
-    signals = tuple(trial.recorder.signals() for trial in trials if trial.recorder is not None)
+    signals = tuple(found for trial in trials if (found := trial.signals()) is not None)
     return Run(summary, signals, outline.points(), moved)

@@ -43,6 +43,8 @@ class Signals:
     tool_error: FloatArray  # (n,) mm
     foot: FloatArray  # (n,3) mm, the path's nearest point to the tool
     line: IntArray  # (n,) source line of the foot point of the tool
+    settling_time: FloatArray  # (m,) s, after the end of the motion
+    settling: FloatArray  # (m,d) mm or rad, tool minus drive then
 
     def __post_init__(self) -> None:
         if self.command.shape != (self.time.size, len(self.axes)):
@@ -82,8 +84,11 @@ class Recorder:
         self._append(np.column_stack([index, rows[:decided], errors[-1].foot, *distances, errors[-1].line]))
         self._count += decided
 
-    def signals(self) -> Signals:
-        """What was kept, as one value; call it after the last block."""
+    def signals(self, settling: FloatArray) -> Signals:
+        """What was kept, as one value; call it after the last block.
+
+        settling: (m,d) tool minus drive, every sample from the end of the motion on.
+        """
         d = len(self._axes)
         table = np.concatenate(self._table) if self._table else np.zeros((0, 5 * d + 8))
         width = self._width(self._count)
@@ -94,6 +99,7 @@ class Recorder:
         return Signals(
             self._case, self._axes, max(width // 2, 1), frozen(table[:, 0] * self._sample_time),
             *parts, *errors, frozen(table[:, 5 * d + 1 : 5 * d + 4]), frozen_integers(table[:, -1]),
+            frozen(np.arange(settling.shape[0]) * self._sample_time), frozen(settling),
         )  # fmt: skip
 
     def _width(self, count: int) -> int:

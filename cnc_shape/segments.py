@@ -105,11 +105,12 @@ def _arcs(
     angle = np.abs(sweep)
     rise = ((end - start) * normal).sum(axis=1)
     arm, end_arm = start - center, end - center - rise[:, None] * normal
-    radius, end_radius = (np.sqrt((vector * vector).sum(axis=1)) for vector in (arm, end_arm))
+    radius = np.sqrt((arm * arm).sum(axis=1))
+    end_radius = np.sqrt((end_arm * end_arm).sum(axis=1))
     # a spiral out of its center has no direction at its start: turn that of its end back
     back = np.cos(sweep)[:, None] * end_arm - np.sin(sweep)[:, None] * np.cross(normal, end_arm)
-    outward = np.where((radius > 0.0)[:, None], arm, back)
-    first = outward / np.where(radius > 0.0, radius, end_radius)[:, None]
+    outward = frozen(np.where((radius > 0.0)[:, None], arm, back))
+    first = outward / np.sqrt((outward * outward).sum(axis=1))[:, None]
     second = np.cross(normal, first) * np.sign(sweep)[:, None]
     growth = (end_radius - radius) / angle
     # rounding of the end point is no spiral
@@ -117,7 +118,7 @@ def _arcs(
     climb = np.where(np.abs(rise) <= 1e-12 * radius, 0.0, rise / angle)
     table = np.column_stack([center, first, second, normal, radius, growth, climb, angle])
     ratio = length / quadrature_lengths(radius, growth, climb, angle)
-    return np.column_stack([table, ratio])
+    return frozen(np.column_stack([table, ratio]))
 
 
 def _arc_boxes(start: FloatArray, end: FloatArray, arcs: FloatArray) -> FloatArray:

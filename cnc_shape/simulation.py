@@ -51,7 +51,12 @@ class SimulationState:
     tangent: FloatArray  # (3,) last direction of the command
     held: Trajectory  # at most one sample, waiting for the one after it
     time: float  # s, of the next sample
-    residual: FloatArray  # (d,) largest |tool - drive| after the end; 0 before
+    settling: FloatArray  # (m,d) mm or rad, tool minus drive at and after the end; (0,d) before
+
+    @property
+    def residual(self) -> FloatArray:
+        """Largest |tool - drive| of every axis once the command has come to rest, (d,) mm or rad."""
+        return np.abs(self.settling).max(axis=0, initial=0.0)
 
 
 def simulating(
@@ -100,17 +105,17 @@ def simulating(
         velocity = np.concatenate([command.velocity, np.zeros_like(rest)])
         joint, tool, drive = run(now, position, velocity)
         _refuse_divergence(tool, drive, now.time, machine, control)
-        residual = now.residual
+        settling = now.settling
         if last and len(command):
             after = np.repeat(rest, _residual_ticks(machine, control) + 1, axis=0)
             still, shaken, _ = run(now, after, np.zeros_like(after))
-            residual = np.abs(np.vstack([tool[-1:] - joint[-1:], shaken - still])).max(axis=0)
+            settling = np.vstack([tool[-1:] - joint[-1:], shaken - still])
         response = Response(
             _rows(command, slice(0, ticks)), frozen(joint), frozen(joint), frozen(tool), frozen(drive)
         )
         held = _rows(command, slice(ticks, None))
         time = now.time + ticks * control.sample_time
-        return SimulationState(now.plant, now.late, now.tangent, held, time, frozen(residual)), response
+        return SimulationState(now.plant, now.late, now.tangent, held, time, frozen(settling)), response
 
     return step
 
@@ -148,7 +153,7 @@ def _start(plant: Plant, command: Trajectory, control: Control) -> SimulationSta
 
 def _copy(state: SimulationState) -> SimulationState:
     return SimulationState(
-        state.plant.copy(), state.late.copy(), state.tangent.copy(), state.held, state.time, state.residual
+        state.plant.copy(), state.late.copy(), state.tangent.copy(), state.held, state.time, state.settling
     )
 
 

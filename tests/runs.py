@@ -101,6 +101,7 @@ def _case(
     signals = Signals(
         name, axes, 1, frozen(time), frozen(command), frozen(position), frozen(tool), frozen(velocity),
         frozen(acceleration), frozen(ce), frozen(de), frozen(te), frozen(feet), frozen_integers(tl),
+        frozen(time[time >= cycle_time] - cycle_time), frozen(deflection[time >= cycle_time]),
     )  # fmt: skip
     return signals, CaseSummary(
         name, cycle_time, deviation(ce, cl), deviation(de, dl), deviation(te, tl),

@@ -240,6 +240,27 @@ def test_a_reader_that_leaves_is_no_error(words: list[str]) -> None:
     assert (done.returncode, done.stderr) == (141, b"")
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")
+@pytest.mark.parametrize("words", [["--version"], ["--help"], ["init", "-"]], ids=lambda words: words[0])
+def test_a_full_disk_behind_standard_output_is_told(words: list[str]) -> None:
+    command = [sys.executable, "-m", "cnc_shape", *words]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, cwd=ROOT, text=True, check=False)
+    assert done.returncode == 2
+    first, second = done.stderr.splitlines()
+    assert first == "error: cannot write to standard output: no space left on device"
+    assert second.startswith("hint: ")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
+@pytest.mark.parametrize(("closed", "status"), [(">&-", 0), ("2>&-", 0), (">&- 2>&-", 0)])
+def test_closed_streams_are_no_bug(closed: str, status: int) -> None:
+    done = subprocess.run(
+        f'"{sys.executable}" -m cnc_shape --version {closed}', shell=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == status
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_json_has_no_nan(value: float) -> None:
     with pytest.raises(ValueError, match="JSON compliant"):

@@ -374,13 +374,28 @@ def test_streamed_where_windows_end_on_vertices(back, ahead):
         assert_array_equal(getattr(got, name), getattr(expected, name))
 
 
-@pytest.mark.parametrize(("back", "ahead"), [(0, 0), (20, 10)])
+@pytest.mark.parametrize("seed", range(20))
+def test_a_sample_waits_for_the_move_that_begins_where_its_window_ends(seed):
+    # the end of one move and the start of the next are one point, but not to the last bit
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-9, 9, (3, 3))
+    path = toolpath(line(*corners[1]), line(*corners[2]), start=tuple(corners[0]))
+    place = path.arc_length[:2]
+    signal = path.end[[0, 0], :3] + 0.1 * rng.normal(size=(2, 3))
+    expected = contour_error(signal, path, *foot_windows(place, 0, 0, 0.0))
+    step = measuring(0, 0, 0.0)
+    state, first = step(None, rows(path, 0, 1), place, (signal,), False)
+    state, second = step(state, rows(path, 1, 2), place[:0], (signal[:0],), True)
+    assert_array_equal(np.concatenate([first[0].distance, second[0].distance]), expected.distance)
+
+
+@pytest.mark.parametrize(("back", "ahead"), [(0, 0), (1, 0), (20, 10)])
 def test_memory_does_not_grow_with_the_path(back, ahead):
     step, state, held = measuring(back, ahead, 0.5), None, []
     for k in range(50):
         path = toolpath(*[line(10.0 * k + 0.1 * j, 0.0) for j in range(1, 101)], start=(10.0 * k, 0.0, 0.0))
         path = replace(path, arc_length=frozen(path.arc_length + 10.0 * k))
-        place = 10.0 * k + np.linspace(0.0, 9.9, 100)
+        place = 10.0 * k + np.linspace(0.0, 9.0, 100)
         state, _ = step(state, path, place, (np.stack([place, 0 * place, 0 * place], axis=1),), False)
         held.append(state.path.low.size)
     assert max(held) <= 300

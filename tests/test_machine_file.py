@@ -488,6 +488,12 @@ def test_degrees_survive_exactly(degrees: float) -> None:
     assert to_degrees(degrees * DEGREE) * DEGREE == degrees * DEGREE
 
 
+@given(st.integers(-360_000, 360_000))
+def test_degrees_are_written_as_a_person_would(thousandths: int) -> None:
+    degrees = thousandths / 1000.0
+    assert to_degrees(degrees * DEGREE) == degrees
+
+
 def test_a_setup_travels_between_processes() -> None:
     setup = parse(EVERY_KEY)
     assert pickle.loads(pickle.dumps(setup)) == setup

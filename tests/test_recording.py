@@ -27,7 +27,7 @@ def record(errors, chunk: int, kept: int) -> Signals:
             frozen(errors[rows]), block, frozen(ramp[rows, 0]), frozen_integers(np.arange(n)[rows])
         )
         recorder.add(Response(command, block, block, block, block), (error, error, error))
-    return recorder.signals()
+    return recorder.signals(np.ones((3, 3)))
 
 
 def test_a_short_motion_is_kept_whole():

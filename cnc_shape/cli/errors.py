@@ -6,12 +6,13 @@ import os
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 import typer
 
 from cnc_shape.cli.output import one_line, print_json
-from cnc_shape.errors import CncShapeError, OptionError
+from cnc_shape.errors import CncShapeError, OptionError, OutputError
 
 DONE: Final = 0
 GATE_FAILED: Final = 1
@@ -54,7 +55,8 @@ def error_object(error: CncShapeError) -> dict[str, object]:
 def report_error(error: CncShapeError, *, json: bool) -> None:
     """Say `error` and its hint on stderr, one line each, and on stdout as JSON where asked for."""
     lines = [str(error)] if error.hint is None else [str(error), f"hint: {error.hint}"]
-    sys.stderr.write("".join(one_line(line) + "\n" for line in lines))
+    with suppress(OSError):  # nobody is left to tell
+        sys.stderr.write("".join(one_line(line) + "\n" for line in lines))
     if json:
         print_json(None, {"error": error_object(error)})
 
@@ -67,7 +69,18 @@ def guarded(command: Callable[[], object], *, json: bool) -> int:
     except BrokenPipeError:
         _close_output()
         return BROKEN_PIPE
+    except OSError as fault:
+        _close_output()
+        report_error(_stream_error(fault), json=False)
+        return WRONG_INPUT
     return status
+
+
+def _stream_error(fault: OSError) -> OutputError:
+    reason = (fault.strerror or str(fault)).lower()
+    return OutputError(
+        f"cannot write to standard output: {reason}", hint="check the disk or the program behind it"
+    )
 
 
 def _attempt(command: Callable[[], object], *, json: bool) -> int:
@@ -88,6 +101,8 @@ def _attempt(command: Callable[[], object], *, json: bool) -> int:
             raise leaving.__context__ from None
         raise
     except Exception as error:
+        if isinstance(error, OSError) and error.filename is None:  # a stream: whatever has a name is known
+            raise
         if isinstance(error, _ClickException):
             report_error(_usage(error), json=json)
             return WRONG_INPUT
@@ -116,7 +131,7 @@ def _bug(error: Exception, *, json: bool) -> int:
 
 
 def _close_output() -> None:
-    """Point stdout at nothing, so that the interpreter's last flush finds no broken pipe."""
+    """Point stdout at nothing, so that the interpreter's last flush has nowhere to fail."""
     sys.stdout = sys.__stdout__
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)

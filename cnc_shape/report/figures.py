@@ -219,15 +219,14 @@ def vibration_figure(run: Run) -> Figure:
         max(np.abs(s.tool[:, k] - s.position[:, k]).max(initial=0.0) for s in run.signals) for k in linear
     ]
     axis = linear[int(np.argmax(largest))]
-    end = max(case.cycle_time for case in run.summary.cases)
     figure, (whole, rest) = _figure(WIDTH, 2.8, 1, 2)
     for k, signals in enumerate(run.signals):
         values = (signals.tool[:, axis] - signals.position[:, axis]) / MICROMETRE
         rows = worst_rows(values)
         whole.plot(signals.time[rows], values[rows], **look(k), label=signals.case)
-        after = np.flatnonzero(signals.time >= end)
-        rows = after[worst_rows(values[after])]
-        rest.plot(signals.time[rows] - end, values[rows], **look(k))
+        after = signals.settling[:, axis] / MICROMETRE
+        rows = worst_rows(after)
+        rest.plot(signals.settling_time[rows], after[rows], **look(k))
     name = run.signals[0].axes[axis].upper()
     whole.set_title(f"Deflection in {name}: tool minus drive")
     whole.set_ylabel("deflection (µm)")
