@@ -432,22 +432,6 @@ def test_machine_codes_are_noted_once_each_kind():
 
 # chunks, and the quick way
 
-MOVES = [
-    "G0",
-    "G1",
-    "G01",
-    "X1",
-    "X-2.5",
-    "Y3",
-    "Z.5",
-    "A45",
-    "F100",
-    "F200.5",
-    "x 1",
-    "N5",
-    "(c)",
-    "G3 I2 J1",
-]
 MODES = [
     "G91",
     "G90",
@@ -455,6 +439,7 @@ MODES = [
     "G21",
     "G93",
     "G94",
+    "F50",
     "G92 X1",
     "G92.1",
     "G7",
@@ -463,11 +448,17 @@ MODES = [
     "G61",
     "G64 P.1",
 ]
-SOME_WORDS = [*MOVES, *MODES, "G4 P.1"]
-WORDS = st.lists(st.sampled_from(SOME_WORDS), min_size=1, max_size=4)
-PROGRAMS = st.lists(WORDS.map(" ".join), min_size=1, max_size=25).map(
-    lambda lines: "\n".join(["G1 F100 X0", *lines])
-)
+CURVES = ["G3 I2 J1", "G4 P.1", "G0 A45", "G1", "G1 X1 X2", "X1e3", "G1 F0 X1", "(c)", ";"]
+axis_words = st.tuples(
+    st.sampled_from(["", "G0", "G1", "G01", "N5 G0"]),
+    st.sampled_from(["", "X1", "X-2.5", "x 1 2"]),
+    st.sampled_from(["", "Y3", "Y-.5"]),
+    st.sampled_from(["", "Z.5", "A45"]),
+    st.sampled_from(["", "", "F100", "F200.5"]),
+).map(" ".join)
+PROGRAMS = st.lists(
+    axis_words | axis_words | st.sampled_from(MODES) | st.sampled_from(CURVES), max_size=25
+).map(lambda lines: "\n".join(["G1 F100 X0", *lines]))
 
 
 @given(PROGRAMS)
