@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from cnc_shape.config.dump import dump_machine
 from cnc_shape.config.setup import Setup, Shaping
-from cnc_shape.opening import digest, open_motion
+from cnc_shape.opening import STANDARD_INPUT, digest, open_motion
 from cnc_shape.pipeline import Run, default_cases, pick_cases, run
 from cnc_shape.readers import ReadingOptions
 from cnc_shape.report import folder as run_folder
@@ -58,6 +58,7 @@ def report_context(
     return run_folder.Context(
         command=command,
         inputs={Path(path).name: digest(path) for path in inputs},
+        program=next((Path(path) for path in inputs if path != STANDARD_INPUT), None),
         machine=dump_machine(setup),
         shapers=shapers,
         modes={axis.name: axis.modes for axis in setup.machine.axes},

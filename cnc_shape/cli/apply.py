@@ -47,7 +47,7 @@ def apply(
         _write(work, target, force=force)
         done = work.summary()
     notes = [] if shapers else ["this machine has no shapers: the command is written unshaped"]
-    warn([*setup.warnings, *motion.warnings(), *notes], quiet=quiet)
+    warn([*motion.warnings(), *notes], quiet=quiet)
     if json:
         print_json("apply", _result(done, target))
     elif target is not None:

@@ -141,7 +141,7 @@ def _text(entry: dict[str, Any]) -> str:
             impulses,
             f"  duration {1e3 * entry['duration_s']:.3f} ms, delay {1e3 * entry['delay_s']:.3f} ms",
             f"  vibration left at the design point {max(entry['residual_vibration']):.1e}",
-            f"  at most {band['tolerance']:.0%} for frequencies {band['low']:.4f} to {high} times the modelled one",
+            f"  at most {band['tolerance']:.0%} where the frequency is {band['low']:.4f} to {high} of the model's",
             f"  sum |A| {entry['sum_abs_amplitude']:.4f}, largest running sum {entry['max_running_sum']:.4f}",
             f"  curve factor {entry['contour_factor']:+.4f} (tool error on a curve, of the unshaped one)",
         )

@@ -73,13 +73,12 @@ def simulate(
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
         result = run(motion.blocks, setup, picked, motion.name, record=wanted)
-    warnings = [*setup.warnings, *motion.warnings()]
     page = None
     if wanted:
         command = ["simulate", motion.name, *(["--cases", cases] if cases else [])]
-        context = report_context([source], setup, command, warnings, kind)
+        context = report_context([source], setup, command, motion.warnings(by_name=True), kind)
         page = _report(result, output, context, force=force)
-    warn(warnings, quiet=quiet)
+    warn(motion.warnings(), quiet=quiet)
     if json:
         extra = {} if page is None else {"report": str(page)}
         print_json(
