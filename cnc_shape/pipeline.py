@@ -23,7 +23,7 @@ from math import ceil, sqrt
 import numpy as np
 
 from cnc_shape.arrays import FloatArray
-from cnc_shape.config.setup import Setup, Shaping
+from cnc_shape.config.setup import Setup
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
 from cnc_shape.errors import OptionError
@@ -105,7 +105,7 @@ def default_cases(setup: Setup) -> tuple[Case, ...]:
         delay_samples=setup.control.delay_samples,
         feedforward=setup.control.feedforward,
     )
-    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
+    shapers = setup.acting_shapers
     if not shapers:
         cases = [Case("independent", {}, alone)]
         last = "cross_coupled"

@@ -35,13 +35,12 @@ def apply(
     from cnc_shape.cli.progress import progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
-    from cnc_shape.config.setup import Shaping
     from cnc_shape.opening import open_motion
 
     target = _target(file, output, force=force)
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
+    shapers = setup.acting_shapers
     with open_motion(file, setup, options) as motion, progress("applying", None, quiet=quiet or json):
         work = Application(motion.blocks, setup.machine, shapers, setup.control.sample_time)
         _write(work, target, force=force)
