@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
+from typing import Any
 
 import numpy as np
 
@@ -102,8 +103,8 @@ def _end(excess: Callable[[FloatArray | float], FloatArray], ratios: FloatArray)
         return None
     first = int(outside[0])
     bracket = (float(ratios[first - 1]), float(ratios[first]))
-    found = root_scalar(excess, bracket=bracket, method="brentq", xtol=1e-13, rtol=1e-13)
-    return float(found.root)  # pyright: ignore[reportUnknownArgumentType]
+    found: Any = root_scalar(excess, bracket=bracket, method="brentq", xtol=1e-13, rtol=1e-13)
+    return float(found.root)
 
 
 def contour_factor(shaper: Shaper, modes: Sequence[Mode]) -> float:
