@@ -24,7 +24,8 @@ from cnc_shape.toolpath import Toolpath
 
 SEGMENT = 0.02  # mm
 SPEED = 0.05  # mm a sample: 50 mm/s at 1 kHz
-ERROR = 0.005  # mm, standard deviation of the samples from the path
+ERROR = 0.005  # mm, amplitude of a vibration about the path
+PASSES = 8  # over the path, so that laying it out weighs little
 WINDOWS = (1.0, 5.0, 20.0, 50.0)  # mm
 
 
@@ -53,7 +54,9 @@ def samples_along(vertices: FloatArray, along: FloatArray) -> tuple[FloatArray, 
     """Places SPEED apart on the path, and positions about ERROR beside them."""
     place = np.arange(0.0, along[-1], SPEED)
     on_path = np.stack([np.interp(place, along, vertices[:, axis]) for axis in range(3)], axis=1)
-    return place, on_path + np.random.default_rng(1).normal(0.0, ERROR, on_path.shape)
+    time = np.arange(place.size) * 1e-3
+    vibration = [np.sin(2.0 * np.pi * frequency * time) for frequency in (31.0, 37.0, 53.0)]
+    return place, on_path + ERROR * np.stack(vibration, axis=1)
 
 
 def best_of(rounds: int, call) -> float:
@@ -73,6 +76,7 @@ def main() -> None:
         "chain of arcs": scallops(2_000),
     }.items():
         place, position = samples_along(vertices, along)
+        place, position = np.tile(place, PASSES), np.tile(position, (PASSES, 1))
         tree = cKDTree(vertices)
         peer = best_of(3, lambda: tree.query(position)) / place.size  # noqa: B023
         empty = position[:1], place[:1], place[:1]

@@ -58,8 +58,8 @@ _HOMES = {
 }
 
 __all__ = [
-    "Control", "CrossCoupling", "Feedforward", "Mode", "Smoothing", "__version__", "build_toolpath", "contour_error",
-    "design", "foot_windows", "load_machine", "plan", "plot", "read_program", "sample", "shape", "simulate",
+    "Control", "CrossCoupling", "Feedforward", "Mode", "Smoothing", "__version__", "build_toolpath",
+    "contour_error", "design", "foot_windows", "load_machine", "plan", "plot", "read_program", "sample", "shape", "simulate",
     "simulate_program", "smooth", "write_report",
 ]  # fmt: skip
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cnc_shape.config.dump import dump_machine
-from cnc_shape.config.setup import Setup, Shaping
-from cnc_shape.opening import digest, open_motion
+from cnc_shape.config.setup import Setup
+from cnc_shape.opening import STANDARD_INPUT, digest, open_motion
 from cnc_shape.pipeline import Run, default_cases, pick_cases, run
 from cnc_shape.readers import ReadingOptions
 from cnc_shape.report import folder as run_folder
@@ -54,12 +54,12 @@ def report_context(
     figure_format: Format = "svg",
 ) -> run_folder.Context:
     """What a run folder says about where its run came from."""
-    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
     return run_folder.Context(
         command=command,
         inputs={Path(path).name: digest(path) for path in inputs},
+        program=next((Path(path) for path in inputs if path != STANDARD_INPUT), None),
         machine=dump_machine(setup),
-        shapers=shapers,
+        shapers=setup.acting_shapers,
         modes={axis.name: axis.modes for axis in setup.machine.axes},
         warnings=warnings,
         figure_format=figure_format,

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import planning
 from cnc_shape.machine import Machine
 from cnc_shape.program import Program
@@ -68,7 +69,8 @@ def moving(
     Raises
     ------
     InfeasibleError
-        A move beyond an axis's travel, or one that no motion can satisfy; names the line.
+        A move beyond an axis's travel, or one that no motion can satisfy, names the line; a program
+        without travel.
     """
     build, smooth = building(), smoothing(Smoothing(path_tolerance))
     built = smoothed = planned = sampled = None
@@ -82,7 +84,11 @@ def moving(
             moved = np.zeros(len(chunk.axes), dtype=np.bool_)
         check_travel(chunk, {axis.name: axis.limits.travel for axis in machine.axes})
         low, high = extent(chunk)
-        moved |= (high - low > STILL).any(axis=0)
+        moved |= np.ptp(np.vstack([chunk.start, low, high]), axis=0) > STILL
+        if last and not moved.any():
+            raise InfeasibleError(
+                "the program moves nothing", hint="it has no G1, G2 or G3 with travel", source=chunk.source
+            )
         built, toolpath = build(built, chunk, last)
         smoothed, path = smooth(smoothed, toolpath, last)
         planned, profile = plan(planned, path, last)

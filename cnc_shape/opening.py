@@ -29,16 +29,24 @@ class OpenMotion:
     notes: list[Note] = field(default_factory=list[Note])
     moved: tuple[str, ...] = ()
 
-    def warnings(self) -> list[str]:
-        """What the reader had to say, and which axes the machine does not describe."""
-        told = [f"{self.path}:{note.line}: warning: {note.message}" for note in self.notes]
+    def warnings(self, *, by_name: bool = False) -> list[str]:
+        """What machine file and reader had to say, and which axes the machine does not describe.
+
+        by_name: speak of files by their names alone, wherever they lie.
+        """
+        machine, path = self.setup.source, self.path
+        told = list(self.setup.warnings)
+        if by_name:
+            told = [text.replace(machine, Path(machine).name, 1) for text in told]
+            path = self.name
+        told += [f"{path}:{note.line}: warning: {note.message}" for note in self.notes]
         missing = lacking(self.setup.machine, self.moved)
         if missing:
             names = ", ".join(axis.upper() for axis in missing)
             told.append(
                 f"warning: the machine lacks {names}, which the program moves: taken as ideal, "
-                f"{LINEAR_DEFAULT.velocity:g} mm/s, {LINEAR_DEFAULT.acceleration:g} mm/s² (90 °/s, 900 °/s²), "
-                "unlimited travel"
+                f"{LINEAR_DEFAULT.velocity:g} mm/s, {LINEAR_DEFAULT.acceleration:g} mm/s² "
+                "(90 °/s, 900 °/s²), unlimited travel"
             )
         return told
 

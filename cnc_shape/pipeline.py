@@ -23,10 +23,10 @@ from math import ceil, sqrt
 import numpy as np
 
 from cnc_shape.arrays import FloatArray
-from cnc_shape.config.setup import Setup, Shaping
+from cnc_shape.config.setup import Setup
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
-from cnc_shape.errors import InfeasibleError, OptionError
+from cnc_shape.errors import OptionError
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.machine import FirstOrderLag, Machine
 from cnc_shape.motion import Block
@@ -105,7 +105,7 @@ def default_cases(setup: Setup) -> tuple[Case, ...]:
         delay_samples=setup.control.delay_samples,
         feedforward=setup.control.feedforward,
     )
-    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
+    shapers = setup.acting_shapers
     if not shapers:
         cases = [Case("independent", {}, alone)]
         last = "cross_coupled"
@@ -240,7 +240,7 @@ def run(
     Raises
     ------
     InfeasibleError
-        The program does not move, a loop is unstable, or what `blocks` raises.
+        A loop is unstable, or what `blocks` raises.
     """
     trials: list[Trial] = []
     outline = Outline()
@@ -261,10 +261,6 @@ def run(
         cycle_time, moved = block.cycle_time, block.moved
         if progress is not None:
             progress(block)
-    if not moved:
-        raise InfeasibleError(
-            "the program moves nothing", hint="it has no G1, G2 or G3 with travel", source=program
-        )
     summary = Summary(
         program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
         tuple(trial.summary() for trial in trials),

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.machine import Axis, FirstOrderLag
@@ -63,7 +63,7 @@ def discretise(axes: Sequence[Axis], sample_time: float) -> Plant:
         # one exponential gives the answers to a step and to a ramp of the input
         augmented = np.zeros((s + 2, s + 2))
         augmented[:s, :s], augmented[:s, s], augmented[s, s + 1] = A, B, 1.0 / sample_time
-        answer = expm(augmented * sample_time)
+        answer = np.asarray(expm(augmented * sample_time), dtype=np.float64)
         transition[row, :s, :s] = answer[:s, :s]
         held[row, :s] = answer[:s, s]
         rising[row, :s] = answer[:s, s + 1]

@@ -81,7 +81,8 @@ class Recorder:
         self._waiting = [rows[decided:]]
         index = np.arange(self._count, self._count + decided)
         distances = [error.distance for error in errors]
-        self._append(np.column_stack([index, rows[:decided], errors[-1].foot, *distances, errors[-1].line]))
+        columns = [index, rows[:decided], errors[-1].foot, *distances, errors[-1].line]
+        self._append(np.column_stack(columns).astype(np.float64, copy=False))
         self._count += decided
 
     def signals(self, settling: FloatArray) -> Signals:
@@ -97,9 +98,12 @@ class Recorder:
         parts = [frozen(table[:, 1 + k * d : 1 + (k + 1) * d]) for k in range(5)]
         errors = [frozen(table[:, 5 * d + 4 + k]) for k in range(3)]
         return Signals(
-            self._case, self._axes, max(width // 2, 1), frozen(table[:, 0] * self._sample_time),
-            *parts, *errors, frozen(table[:, 5 * d + 1 : 5 * d + 4]), frozen_integers(table[:, -1]),
-            frozen(np.arange(settling.shape[0]) * self._sample_time), frozen(settling),
+            case=self._case, axes=self._axes, factor=max(width // 2, 1),
+            time=frozen(table[:, 0] * self._sample_time),
+            command=parts[0], position=parts[1], tool=parts[2], velocity=parts[3], acceleration=parts[4],
+            command_error=errors[0], drive_error=errors[1], tool_error=errors[2],
+            foot=frozen(table[:, 5 * d + 1 : 5 * d + 4]), line=frozen_integers(table[:, -1]),
+            settling_time=frozen(np.arange(settling.shape[0], dtype=np.int64) * self._sample_time), settling=frozen(settling),
         )  # fmt: skip
 
     def _width(self, count: int) -> int:
@@ -163,7 +167,7 @@ def _thin(table: FloatArray, width: int) -> FloatArray:
     bucket = (table[:, 0] // width).astype(np.int64)
     error = table[:, -2]
     first = np.flatnonzero(np.concatenate([[True], np.diff(bucket) > 0]))
-    rows = np.arange(table.shape[0])
+    rows = np.arange(table.shape[0], dtype=np.int64)
     by_error = np.lexsort((rows, error, bucket))  # within a bucket: rising error, then time
     last = np.concatenate([first[1:], [table.shape[0]]]) - 1
     highest = np.maximum.reduceat(error, first)

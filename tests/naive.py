@@ -80,7 +80,7 @@ def contour_distance(point, toolpath, lower=-np.inf, upper=np.inf, count=2001, r
 
 
 def servo_loop(command, axes, loop):
-    """The loop with lag drives as matrices over lists: one expm a sample period and axis, terms as formulas."""
+    """The loop with lag drives as matrices over lists: one expm a period and axis, terms as formulas."""
     from scipy.linalg import expm
 
     T, n = loop.sample_time, len(command)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 
+from cnc_shape.errors import ProgramError
 from cnc_shape.program import Program, concatenate
+from cnc_shape.readers import read_program
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
 from cnc_shape.readers.source import Source
 
@@ -24,6 +27,22 @@ def chunks(text: str | bytes, options: GcodeOptions = DEFAULT, name: str = "part
 def read(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program:
     """Read G-code from memory."""
     return concatenate(chunks(text, options))
+
+
+def attempt(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program | ProgramError:
+    """Read G-code from memory; a refusal is an answer too."""
+    try:
+        return read(text, options)
+    except ProgramError as error:
+        return error
+
+
+def attempt_file(path: Path) -> Program | ProgramError:
+    """Read a file; a refusal is an answer too."""
+    try:
+        return read_program(path)
+    except ProgramError as error:
+        return error
 
 
 def assert_same(one: Program, other: Program, *, but: tuple[str, ...] = ()) -> None:

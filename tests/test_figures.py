@@ -15,6 +15,7 @@ from runs import MODE, make_run, shaper
 
 from cnc_shape.arrays import frozen
 from cnc_shape.report import figures
+from cnc_shape.report.shaper_figure import shaper_figure
 
 RUN = make_run(2000)
 SHAPERS = {"x": shaper(), "y": shaper()}
@@ -113,8 +114,27 @@ def test_flat_and_empty_paths_are_drawn(shape):
 
 
 def test_axes_with_one_shaper_share_a_row():
-    assert len(figures.shaper_figure(SHAPERS, MODES).axes) == 2
+    assert len(shaper_figure(SHAPERS, MODES).axes) == 2
     other = {**SHAPERS, "z": replace(shaper(), times=frozen([0.0, 0.01]))}
-    assert len(figures.shaper_figure(other, {**MODES, "z": ()}).axes) == 4
-    first, second = (figures.render(figures.shaper_figure(SHAPERS, MODES), "svg") for _ in range(2))
+    assert len(shaper_figure(other, {**MODES, "z": ()}).axes) == 4
+    first, second = (figures.render(shaper_figure(SHAPERS, MODES), "svg") for _ in range(2))
     assert first == second
+
+
+def test_what_the_structure_does_after_the_end_is_drawn_and_may_be_nothing():
+    rest = figures.vibration_figure(RUN).axes[1]
+    for line, signals in zip(rest.lines, RUN.signals, strict=True):
+        assert np.max(np.abs(line.get_ydata())) in np.abs(signals.settling).max(axis=0) / 1e-3
+    still = [replace(s, settling_time=frozen([]), settling=frozen(np.zeros((0, 3)))) for s in RUN.signals]
+    assert figures.render(figures.vibration_figure(replace(RUN, signals=tuple(still))), "png")
+
+
+def test_no_title_of_a_path_is_cut():
+    for case in ("shaped", "shaped+cross_coupled+disturbance_observer"):
+        flat = [replace(s, case=case, tool=s.tool * [1.0, 0.6, 1.0]) for s in RUN.signals]
+        figure = figures.path_figure(
+            replace(RUN, path=frozen(RUN.path * [1.0, 0.6, 1.0]), signals=tuple(flat))
+        )
+        figure.canvas.draw()
+        for ax in figure.axes:
+            assert ax.title.get_window_extent().y1 <= figure.bbox.y1

@@ -16,6 +16,7 @@ from runs import MODE, PROGRAM, TEXT, make_run, shaper
 
 from cnc_shape.arrays import frozen
 from cnc_shape.errors import InfeasibleError, OutputError
+from cnc_shape.report import figures
 from cnc_shape.report.folder import RUNS, Context, default_folder, write_report
 from cnc_shape.report.table import summary_json
 
@@ -29,8 +30,9 @@ CONTEXT = Context(
     warnings=("part.nc:3: warning: µ",),
 )
 FILES = {
-    "report.html", "results.json", "signals.npz", "tables.csv", "machine.yaml", "run.json", "figures/path.svg",
-    "figures/error.svg", "figures/motion.svg", "figures/vibration.svg", "figures/shapers.svg",
+    "report.html", "results.json", "signals.npz", "tables.csv", "machine.yaml", "run.json",
+    "figures/path.svg", "figures/error.svg", "figures/motion.svg", "figures/vibration.svg",
+    "figures/shapers.svg",
 }  # fmt: skip
 
 
@@ -43,6 +45,12 @@ def written(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("out") / "run"
     assert write_report(RUN, folder, CONTEXT) == folder / "report.html"
     return folder
+
+
+@pytest.fixture
+def quick(monkeypatch) -> None:
+    """Leave the drawing out, where it is not what is tested."""
+    monkeypatch.setattr(figures, "render", lambda figure, kind: b"<svg/>")
 
 
 def test_the_folder_holds_what_it_promises(written):
@@ -76,6 +84,7 @@ def test_signals_hold_every_sample_time_first_with_units(written):
             assert_array_equal(signals[f"{case.case}/acceleration_x_mm_s2"], case.acceleration[:, 0])
             assert_array_equal(signals[f"{case.case}/tool_contour_error_mm"], case.tool_error)
             assert_array_equal(signals[f"{case.case}/line"], case.line)
+            assert_array_equal(signals[f"{case.case}/settling_x_mm"], case.settling[:, 0])
 
 
 def test_run_json_names_inputs_versions_and_command(written):
@@ -87,7 +96,7 @@ def test_run_json_names_inputs_versions_and_command(written):
     assert run["versions"]["numpy"] == np.__version__
 
 
-def test_the_default_folder_goes_with_what_was_run(tmp_path, monkeypatch):
+def test_the_default_folder_goes_with_what_was_run(tmp_path, monkeypatch, quick):
     folder = default_folder(RUN, CONTEXT)
     assert folder == default_folder(RUN, CONTEXT)
     assert folder.parent == Path(RUNS)
@@ -107,20 +116,22 @@ def test_the_default_folder_stays_in_its_place(name):
     assert len(folder.name) < 100
 
 
-def test_an_older_folder_needs_force(written):
+def test_an_older_folder_needs_force(tmp_path, quick):
+    write_report(RUN, tmp_path / "run", CONTEXT)
+    before = content(tmp_path / "run")
+    (tmp_path / "run" / "stale").write_bytes(b"")
     with pytest.raises(OutputError, match="exists"):
-        write_report(RUN, written, CONTEXT)
-    before = content(written)
-    write_report(RUN, written, CONTEXT, force=True)
-    assert content(written) == before
+        write_report(RUN, tmp_path / "run", CONTEXT)
+    write_report(RUN, tmp_path / "run", CONTEXT, force=True)
+    assert content(tmp_path / "run") == before
 
 
-@pytest.mark.parametrize("name", ["tool", "velocity", "drive_error", "time", "foot"])
+@pytest.mark.parametrize("name", ["tool", "velocity", "drive_error", "time", "foot", "settling"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_signal_that_is_not_finite_is_named_with_its_time_and_nothing_is_written(tmp_path, name, value):
     shaped = RUN.signal("shaped")
     values = getattr(shaped, name).copy()
-    values[100] = value
+    values[60] = value
     bad = replace(shaped, **{name: frozen(values)})
     with pytest.raises(InfeasibleError, match=rf"{name}.* of the case shaped is {value} at t = "):
         write_report(replace(RUN, signals=(RUN.signals[0], bad, RUN.signals[2])), tmp_path / "run", CONTEXT)
@@ -128,7 +139,7 @@ def test_a_signal_that_is_not_finite_is_named_with_its_time_and_nothing_is_writt
 
 
 @pytest.mark.parametrize("call", [1, 5, 12])
-def test_a_fault_leaves_nothing(tmp_path, monkeypatch, call):
+def test_a_fault_leaves_nothing(tmp_path, monkeypatch, call, quick):
     original, calls = os.fsync, []
 
     def faulty(descriptor):
@@ -143,7 +154,7 @@ def test_a_fault_leaves_nothing(tmp_path, monkeypatch, call):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_names_that_are_no_text_are_spelled_out(tmp_path):
+def test_names_that_are_no_text_are_spelled_out(tmp_path, quick):
     odd = "part\udcff.nc"
     run = replace(RUN, summary=replace(RUN.summary, program=odd))
     write_report(run, tmp_path / "run", replace(CONTEXT, inputs={odd: "00"}, command=("simulate", odd)))
@@ -151,7 +162,7 @@ def test_names_that_are_no_text_are_spelled_out(tmp_path):
     assert b"part\\udcff.nc" in (tmp_path / "run" / "report.html").read_bytes()
 
 
-def test_figures_come_in_the_format_asked_for(tmp_path):
+def test_figures_come_in_the_format_asked_for(tmp_path, quick):
     write_report(RUN, tmp_path / "run", replace(CONTEXT, figure_format="png"))
     assert {p.suffix for p in (tmp_path / "run" / "figures").iterdir()} == {".png"}
     assert b"data:image/svg+xml" in (tmp_path / "run" / "report.html").read_bytes()

@@ -89,7 +89,7 @@ def tiny_segments():
             at = at + 0.04 * np.array(direction)
             moves.append(line(*at, feed_rate=80.0))
         if k == 1:
-            moves.append(arc(tuple(at), tuple(at + [4.0, 0, 0]), 6 * np.pi, feed_rate=60.0))
+            moves.append(arc(tuple(at), (at[0] + 4.0, at[1], at[2]), 6 * np.pi, feed_rate=60.0))
     return program(*moves)
 
 
@@ -107,7 +107,7 @@ def test_tiny_segments_with_corners_on_the_borders_of_chunks(size):
 
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_samples_keep_their_numbers(sample):
-    """Golden summaries; after a change that is meant to move them, write them anew and look at the difference."""
+    """Golden summaries: a change that is meant to move them writes them anew, and says why."""
     got = summary_json(simulate_program(bundled(sample), setup_of(sample), record=False).summary)
     path = GOLDEN / f"{sample}.json"
     want = json.loads(path.read_text())

@@ -214,3 +214,14 @@ def test_a_fault_of_the_caller_is_not_the_files(file):
 def test_an_endless_line_is_refused_before_it_is_gathered(file):
     with pytest.raises(ProgramError, match="longer than the limit"):
         read_program(file(b"G" * 5_000_000, "a.nc"))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_line_ends_across_the_border_of_two_blocks(monkeypatch, end):
+    from cnc_shape.readers import source
+
+    text = end.join(["G0 X1", "", "G0 X22", "", "", "M2"])
+    for size in range(1, len(text) + 2):
+        monkeypatch.setattr(source, "BLOCK_BYTES", size)
+        opened = source.Source("a.nc", io.BytesIO(text.encode()), ReadingLimits())
+        assert list(source.lines(opened)) == list(enumerate(["G0 X1", "", "G0 X22", "", "", "M2"], 1))

@@ -77,12 +77,12 @@ def test_cascade_silences_both_modes(first, second):
 @pytest.mark.parametrize("damping", [0.0, 0.1, 0.3])
 @pytest.mark.parametrize("ratio", [0.8, 1.0, 1.17])
 def test_residual_equals_a_simulated_impulse_response(damping, ratio):
-    """RK45 of ``y'' + 2 zeta omega y' + omega^2 y = impulses``: amplitude after the last, over one impulse's."""
+    """RK45 of ``y'' + 2 zeta omega y' + omega^2 y = impulses``: swing after the last, over one impulse's."""
     mode, actual = Mode(2.0, damping), 2.0 * np.pi * 2.0 * ratio
     shaper = zvd(mode)
     state = np.zeros(2)
     for i, (time, amplitude) in enumerate(zip(shaper.times, shaper.amplitudes, strict=True)):
-        state = state + [0.0, amplitude]
+        state = state + np.array([0.0, amplitude])
         if i + 1 < shaper.times.size:
             state = solve_ivp(
                 lambda _, y: [y[1], -2 * damping * actual * y[1] - actual**2 * y[0]],

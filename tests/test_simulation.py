@@ -246,7 +246,7 @@ def test_an_unstable_loop_is_told_with_its_largest_gain(sample_time, limit):
         simulating(stage, Control(sample_time, 1.01 * limit))
 
 
-def test_delay_lowers_the_stable_gain():  # 660.7 1/s across at Kp 20 with one sample of delay, paper 004's plants
+def test_delay_lowers_the_stable_gain():  # 660.7 1/s across at Kp 20 with one sample of delay, paper 004
     stage = machine(0.0142, 0.9982)
     simulating(stage, Control(T, 20.0, 1, None, CrossCoupling(640.0)))
     with pytest.raises(InfeasibleError, match="across the path"):

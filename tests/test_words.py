@@ -25,8 +25,8 @@ def summary(*cases: CaseSummary) -> Summary:
 def test_the_verdict_names_what_was_what_is_and_the_price_in_time():
     text = verdict(summary(case("unshaped", 0.04, 0.1, 10.0), case("shaped", 0.01, 0.02, 10.05)))
     assert text == (
-        "Unshaped, the tool leaves the programmed path by up to 100 µm (line 7) and 40.0 µm RMS; shaped, by up to "
-        "20.0 µm (line 7) and 10.0 µm RMS, 75 % less, for 50.0 ms (0.5 %) more."
+        "Unshaped, the tool leaves the programmed path by up to 100 µm (line 7) and 40.0 µm RMS; shaped, by "
+        "up to 20.0 µm (line 7) and 10.0 µm RMS, 75 % less, for 50.0 ms (0.5 %) more."
     )
 
 

@@ -32,22 +32,22 @@ def apply(
     """Shape a program's axis commands and write them at the servo period."""
     from cnc_shape.applying import Application
     from cnc_shape.cli.output import print_json, print_text, warn
-    from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.progress import announce_compilation, progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
-    from cnc_shape.config.setup import Shaping
     from cnc_shape.opening import open_motion
 
     target = _target(file, output, force=force)
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    shapers = setup.shapers if setup.planning.shaping is Shaping.AXIS else {}
+    shapers = setup.acting_shapers
+    announce_compilation(quiet=quiet or json)
     with open_motion(file, setup, options) as motion, progress("applying", None, quiet=quiet or json):
         work = Application(motion.blocks, setup.machine, shapers, setup.control.sample_time)
         _write(work, target, force=force)
         done = work.summary()
     notes = [] if shapers else ["this machine has no shapers: the command is written unshaped"]
-    warn([*setup.warnings, *motion.warnings(), *notes], quiet=quiet)
+    warn([*motion.warnings(), *notes], quiet=quiet)
     if json:
         print_json("apply", _result(done, target))
     elif target is not None:

@@ -56,21 +56,21 @@ def design(
             f"{len(frequencies)} frequencies but {len(dampings)} damping ratios",
             hint="repeat --damping-ratio once for each --frequency-hz, or leave it out for undamped modes",
         )
-    per_axis: list[tuple[str | None, tuple[Mode, ...]]]
+    per_axis: list[tuple[str | None, tuple[Mode, ...]]] = []
     if frequencies:
         pairs = zip(frequencies, dampings or [0.0] * len(frequencies), strict=True)
         share = 1.0 / len(frequencies)
-        per_axis = [(None, tuple(Mode(f, z, share) for f, z in pairs))]
+        per_axis.append((None, tuple(Mode(f, z, share) for f, z in pairs)))
     else:
-        per_axis = _machine_modes(machine)
+        per_axis.extend(_machine_modes(machine))
     designs: list[dict[str, Any]] = []
     for axis, modes in per_axis:
         if shaper in SINGLE_MODE and len(modes) > 1:
             raise OptionError(
                 f"{shaper} is for one mode, not {len(modes)}", hint="use cascade, or give one --frequency-hz"
             )
-        made = SINGLE_MODE[shaper](modes[0]) if shaper in SINGLE_MODE else cascade(modes, SINGLE_MODE[of])
-        options = {"of": of} if shaper == "cascade" else {}
+        made = SINGLE_MODE[shaper](next(iter(modes))) if shaper in SINGLE_MODE else cascade(modes, SINGLE_MODE[of])
+        options: dict[str, object] = {"of": of} if shaper == "cascade" else {}
         designs.append(_describe(axis, shaper, made, modes, options, vibration_tolerance))
     if json:
         print_json("design", {"designs": designs})
@@ -141,7 +141,7 @@ def _text(entry: dict[str, Any]) -> str:
             impulses,
             f"  duration {1e3 * entry['duration_s']:.3f} ms, delay {1e3 * entry['delay_s']:.3f} ms",
             f"  vibration left at the design point {max(entry['residual_vibration']):.1e}",
-            f"  at most {band['tolerance']:.0%} for frequencies {band['low']:.4f} to {high} times the modelled one",
+            f"  at most {band['tolerance']:.0%} where the frequency is {band['low']:.4f} to {high} of the model's",
             f"  sum |A| {entry['sum_abs_amplitude']:.4f}, largest running sum {entry['max_running_sum']:.4f}",
             f"  curve factor {entry['contour_factor']:+.4f} (tool error on a curve, of the unshaped one)",
         )

@@ -11,8 +11,9 @@ from typing import Final
 
 import typer
 
-from cnc_shape.cli.output import one_line, print_json
+from cnc_shape.cli.output import print_json
 from cnc_shape.errors import CncShapeError, OptionError, OutputError
+from cnc_shape.report.text import one_line
 
 DONE: Final = 0
 GATE_FAILED: Final = 1

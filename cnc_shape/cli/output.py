@@ -6,6 +6,8 @@ import json
 import sys
 from collections.abc import Iterable, Mapping
 
+from cnc_shape.report.text import one_line
+
 
 def print_json(command: str | None, result: Mapping[str, object]) -> None:
     """Print `result` as one JSON object, its schema ``cnc-shape/<command>/1`` first.
@@ -41,8 +43,3 @@ def warn(warnings: Iterable[str], *, quiet: bool) -> None:
     if not quiet:
         for warning in warnings:
             print_error(warning)
-
-
-def one_line(text: str) -> str:
-    """Return `text` with every control character spelled out, so that it is one harmless line."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

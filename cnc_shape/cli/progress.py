@@ -9,6 +9,14 @@ from contextlib import contextmanager
 Advance = Callable[[float], None]
 
 
+def announce_compilation(*, quiet: bool) -> None:
+    """Say so when the kernels have to be compiled first: it happens once, and takes its time."""
+    from cnc_shape.kernels import compiled_before
+
+    if not quiet and not compiled_before():
+        sys.stderr.write("compiling the numerical kernels for this processor, once: some twenty seconds\n")
+
+
 @contextmanager
 def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advance]:
     """Show a bar for `what`; the body calls the value with how much of `total` it has just done.

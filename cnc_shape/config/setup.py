@@ -50,3 +50,8 @@ class Setup:
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper], compare=False)  # axis: designed
     warnings: tuple[str, ...] = field(default=(), compare=False)
     source: str = field(default="", compare=False)
+
+    @property
+    def acting_shapers(self) -> Mapping[str, Shaper]:
+        """Shapers that `planning.shaping` lets act: those of the axes, or none."""
+        return self.shapers if self.planning.shaping is Shaping.AXIS else dict[str, Shaper]()

@@ -30,7 +30,8 @@ class FeedforwardGains(NamedTuple):
 
 def gains(feedforward: Feedforward, axes: Sequence[Axis]) -> FeedforwardGains:
     """Gains of every axis: a lag drive needs ``u = (v + tau a) / k`` (spec: contour control, section 3.5)."""
-    velocity, acceleration = [], []
+    velocity: list[float] = []
+    acceleration: list[float] = []
     for axis in axes:
         own = axis.drive if isinstance(axis.drive, FirstOrderLag) else FirstOrderLag(0.0)
         gain = own.gain if feedforward.model_gain is None else feedforward.model_gain

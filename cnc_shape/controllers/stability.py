@@ -61,7 +61,8 @@ def check_stability(axes: Sequence[Axis], control: Control) -> None:
                 continue
             largest = _largest_stable_gain(axis, control)
             raise InfeasibleError(
-                f"the loop of axis {axis.name} is unstable: {name} {gain:g} 1/s, stable below {largest:.4g} 1/s",
+                f"the loop of axis {axis.name} is unstable: {name} {gain:g} 1/s, "
+                f"stable below {largest:.4g} 1/s",
                 hint="lower position_gain_per_s or cross_coupling.proportional_per_s, or sample faster",
             )
 

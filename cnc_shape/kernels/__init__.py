@@ -63,6 +63,12 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 import numba  # noqa: E402  # the cache folder must be named first
 
 
+def compiled_before() -> bool:
+    """Whether this installation has compiled kernels on this machine already."""
+    folder = os.environ["NUMBA_CACHE_DIR"]
+    return any(name.endswith(".nbc") for _, _, names in os.walk(folder) for name in names)
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` to cached, serial machine code with IEEE arithmetic.
 

@@ -14,7 +14,7 @@ def add_squares(values, total):
 
 @kernel
 def largest_ratio(values, limit, worst):
-    """Raise `worst` (1,), in place, to the largest ``|values[k, a]| / limit[a]``. values (n,d), limit (d,)."""
+    """Raise `worst` (1,), in place, to the largest ``|values[k, a]| / limit[a]``; (n,d) and (d,)."""
     for k in range(values.shape[0]):
         for a in range(values.shape[1]):
             ratio = abs(values[k, a]) / limit[a]

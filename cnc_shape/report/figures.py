@@ -1,24 +1,19 @@
-"""Static figures of a run: path with magnified error, error over time, motion, vibration, shapers."""
+"""Static figures of a run: path with magnified error, error over time, motion, vibration."""
 
 from __future__ import annotations
 
-import functools
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cnc_shape.arrays import FloatArray, IntArray
-from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run
 from cnc_shape.program import ROTARY
 from cnc_shape.recording import Signals
-from cnc_shape.report.style import COLOURS, METADATA, PATH_COLOUR, RC, look
-from cnc_shape.shapers import Shaper
-from cnc_shape.shapers.analysis import insensitivity, residual_vibration
+from cnc_shape.report.style import METADATA, PATH_COLOUR, RC, WIDTH, look, new_figure, styled
 from cnc_shape.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -26,9 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-P = ParamSpec("P")
 Format = Literal["svg", "png", "pdf"]
-WIDTH = 7.2  # inch, two columns of a journal
 PANELS = 3  # paths side by side at most
 DRAWN = 1_000  # buckets of a line over time; the worst and the best of each is drawn
 DRAWN_PATH = 20_000  # points of a path that are drawn
@@ -41,39 +34,8 @@ def render(figure: Figure, kind: Format) -> bytes:
 
     content = io.BytesIO()
     with mpl.rc_context(RC):
-        figure.savefig(content, format=kind, metadata=METADATA[kind], dpi=160, bbox_inches="tight")
+        figure.savefig(content, format=kind, metadata=METADATA[kind], dpi=160)
     return content.getvalue()
-
-
-def _styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw in our own style, whatever the style of the process is."""
-
-    @functools.wraps(draw)
-    def styled(*arguments: P.args, **named: P.kwargs) -> Figure:
-        import matplotlib as mpl
-
-        with mpl.rc_context(RC):
-            return draw(*arguments, **named)
-
-    return styled
-
-
-def _figure(
-    width: float,
-    height: float,
-    rows: int = 1,
-    columns: int = 1,
-    *,
-    sharex: bool = False,
-    sharey: bool = False,
-) -> tuple[Figure, list[Axes]]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
-    return figure, list(grid.ravel())
 
 
 def worst_rows(values: FloatArray, buckets: int = DRAWN) -> IntArray:
@@ -113,7 +75,7 @@ def _magnified(signals: Signals, factor: float, rows: IntArray) -> FloatArray:
     return foot + factor * (signals.tool[rows, :3] - foot)
 
 
-@_styled
+@styled
 def path_figure(run: Run) -> Figure:
     """Programmed path, and drives and tool of every case with their distance to it magnified."""
     factor, (i, j) = _magnification(run), _plane(run)
@@ -123,14 +85,10 @@ def path_figure(run: Run) -> Figure:
     columns = 1 if slope < 0.4 else min(count, PANELS)
     rows = ceil(count / columns)
     panel = (WIDTH - 0.6) / columns if columns > 1 or slope < 0.4 else 4.5
-    figure, axes = _figure(
-        panel * columns + 0.6,
-        (slope * (panel - 0.3) + 0.55) * rows + 0.8,
-        rows,
-        columns,
-        sharex=True,
-        sharey=True,
-    )
+    titles = [f"{_folded(signals.case)}\n{_worst_place(signals)}" for signals in run.signals]
+    lines = max((title.count("\n") + 1 for title in titles), default=1)
+    height = (slope * (panel - 0.3) + 0.5 + 0.19 * lines) * rows + 0.55
+    figure, axes = new_figure(panel * columns + 0.6, height, rows, columns, sharex=True, sharey=True)
     handles: list[Line2D] = []
     for k, (ax, signals) in enumerate(zip(axes, run.signals, strict=False)):
         programmed = ax.plot(run.path[:, i], run.path[:, j], color=PATH_COLOUR, linewidth=2.2, alpha=0.45)
@@ -142,8 +100,7 @@ def path_figure(run: Run) -> Figure:
         circle = ax.plot(
             mark[:, i], mark[:, j], "o", color="black", markersize=5.5, fillstyle="none", markeredgewidth=0.8
         )
-        largest = f"max {signals.tool_error[worst] / MICROMETRE:.3g} µm, line {signals.line[worst]}"
-        ax.set_title(f"{_folded(signals.case)}\n{largest}")
+        ax.set_title(titles[k])
         ax.set_aspect("equal", adjustable="box")
         ax.margins(0.06)
         if k + columns >= count:
@@ -151,18 +108,30 @@ def path_figure(run: Run) -> Figure:
             ax.tick_params(labelbottom=True)
         if k % columns == 0:
             ax.set_ylabel(f"{'XYZ'[j]} (mm)")
-        handles = [programmed[0], tool[0], circle[0]]
+        handles = [programmed[0], *_neutral(tool), circle[0]]
     for ax in axes[count:]:
         ax.set_visible(False)
-    labels = ["programmed path", f"tool, contour error × {factor:g}", "worst place"]  # noqa: RUF001
+    labels = ["programmed path", f"tool, contour error × {factor:g}", "worst place"]
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
 
 
-@_styled
+def _worst_place(signals: Signals) -> str:
+    worst = int(signals.tool_error.argmax())
+    return f"max {signals.tool_error[worst] / MICROMETRE:.3g} µm, line {signals.line[worst]}"
+
+
+def _neutral(lines: Sequence[Line2D]) -> list[Line2D]:
+    """A line for the legend that stands for lines of every colour."""
+    from matplotlib.lines import Line2D
+
+    return [Line2D([], [], color="black", linewidth=line.get_linewidth()) for line in lines]
+
+
+@styled
 def error_figure(run: Run) -> Figure:
     """Contour error of the tool over time, and of the drives, one line a case."""
-    figure, axes = _figure(WIDTH, 4.4, 2, 1, sharex=True)
+    figure, axes = new_figure(WIDTH, 4.4, 2, 1, sharex=True)
     for ax, name, title in zip(axes, ("tool_error", "drive_error"), ("Tool", "Drives"), strict=True):
         for k, signals in enumerate(run.signals):
             values = getattr(signals, name)
@@ -177,10 +146,10 @@ def error_figure(run: Run) -> Figure:
     return figure
 
 
-@_styled
+@styled
 def motion_figure(run: Run) -> Figure:
     """Speed and acceleration of every case's command over time; cases with one command share a line."""
-    figure, axes = _figure(WIDTH, 4.4, 2, 1, sharex=True)
+    figure, axes = new_figure(WIDTH, 4.4, 2, 1, sharex=True)
     for k, (names, signals) in _by_command(run).items():
         speed = np.sqrt((signals.velocity[:, :3] ** 2).sum(axis=1))
         acceleration = np.abs(signals.acceleration[:, :3]).max(axis=1, initial=0.0)
@@ -211,7 +180,7 @@ def _by_command(run: Run) -> dict[int, tuple[list[str], Signals]]:
     return groups
 
 
-@_styled
+@styled
 def vibration_figure(run: Run) -> Figure:
     """Deflection of the structure, tool minus drive, of the axis that vibrates most."""
     linear = [k for k, axis in enumerate(run.signals[0].axes) if axis not in ROTARY]
@@ -219,7 +188,7 @@ def vibration_figure(run: Run) -> Figure:
         max(np.abs(s.tool[:, k] - s.position[:, k]).max(initial=0.0) for s in run.signals) for k in linear
     ]
     axis = linear[int(np.argmax(largest))]
-    figure, (whole, rest) = _figure(WIDTH, 2.8, 1, 2)
+    figure, (whole, rest) = new_figure(WIDTH, 2.8, 1, 2)
     for k, signals in enumerate(run.signals):
         values = (signals.tool[:, axis] - signals.position[:, axis]) / MICROMETRE
         rows = worst_rows(values)
@@ -237,59 +206,6 @@ def vibration_figure(run: Run) -> Figure:
         ax.margins(x=0.0)
     _legend(figure, whole)
     return figure
-
-
-@_styled
-def shaper_figure(shapers: Mapping[str, Shaper], modes: Mapping[str, Sequence[Mode]]) -> Figure:
-    """Impulses of every shaped axis, and the vibration it leaves when the frequencies are off."""
-    alike = _alike(shapers, modes)
-    figure, axes = _figure(WIDTH, 2.5 * len(alike), len(alike), 2)
-    ratio = np.linspace(0.5, 1.5, 1001)
-    for row, names in enumerate(alike):
-        axis, title = names[0], ", ".join(names).upper()
-        shaper = shapers[axis]
-        left, right = axes[2 * row], axes[2 * row + 1]
-        left.vlines(shaper.times * 1e3, 0.0, shaper.amplitudes, color=COLOURS[1], linewidth=1.6)
-        left.plot(shaper.times * 1e3, shaper.amplitudes, "o", color=COLOURS[1], markersize=4.0)
-        left.axhline(0.0, color=PATH_COLOUR, linewidth=0.6)
-        left.set_ylim(1.15 * min(0.0, float(shaper.amplitudes.min())), 1.15 * float(shaper.amplitudes.max()))
-        left.set_title(f"{title}: impulses")
-        left.set_ylabel("amplitude (-)")
-        left.set_xlabel("time (ms)")
-        for k, mode in enumerate(modes[axis]):
-            label = f"{mode.natural_frequency:g} Hz, ζ {mode.damping_ratio:g}"
-            right.plot(ratio, 100.0 * residual_vibration(shaper, mode, ratio), **look(k), label=label)
-        if modes[axis]:
-            band = insensitivity(shaper, modes[axis])
-            high = 1.5 if band.high is None else min(band.high, 1.5)
-            right.axvspan(max(band.low, 0.5), high, color=PATH_COLOUR, alpha=0.25, linewidth=0.0)
-            right.axhline(100.0 * band.tolerance, color=PATH_COLOUR, linewidth=0.8, linestyle=(0, (4, 3)))
-            right.set_title(f"{title}: vibration left (band: {100.0 * band.tolerance:.0f} % at most)")
-            right.legend(loc="upper center", ncols=2)
-        right.set_ylabel("V (%)")
-        right.set_xlabel("actual / modelled frequency (-)")
-        right.set_ylim(0.0, 115.0)
-        right.set_yticks([0.0, 25.0, 50.0, 75.0, 100.0])
-        right.margins(x=0.0)
-    return figure
-
-
-def _alike(shapers: Mapping[str, Shaper], modes: Mapping[str, Sequence[Mode]]) -> list[list[str]]:
-    """Axes in groups that share their impulses and modes."""
-    groups: list[list[str]] = []
-    for axis, shaper in shapers.items():
-        for group in groups:
-            other = shapers[group[0]]
-            if (
-                np.array_equal(shaper.times, other.times)
-                and np.array_equal(shaper.amplitudes, other.amplitudes)
-                and tuple(modes[axis]) == tuple(modes[group[0]])
-            ):
-                group.append(axis)
-                break
-        else:
-            groups.append([axis])
-    return groups
 
 
 def _folded(case: str) -> str:

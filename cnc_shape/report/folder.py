@@ -24,6 +24,7 @@ from cnc_shape.program import ROTARY
 from cnc_shape.recording import Signals
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.table import summary_json, tables_csv
 from cnc_shape.shapers import Shaper
 from cnc_shape.units import DEGREE
@@ -133,7 +134,8 @@ def _check(signals: Signals, name: str, values: FloatArray) -> None:
     if bad.size:
         row, *column = bad[0].tolist()
         axis = f" of {signals.axes[column[0]].upper()}" if column else ""
-        value, time = values[row, *column], signals.time[row]
+        settling = name.startswith("settling")
+        value, time = values[row, *column], (signals.settling_time if settling else signals.time)[row]
         raise InfeasibleError(
             f"{name}{axis} of the case {signals.case} is {value} at t = {time:.6g} s",
             hint="the motion ran away: lower the gains of its loop, or check its shapers",
@@ -149,7 +151,7 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
         "vibration": figures.vibration_figure(run),
     }
     if context.shapers:
-        drawn["shapers"] = figures.shaper_figure(context.shapers, context.modes)
+        drawn["shapers"] = shaper_figure(context.shapers, context.modes)
     return drawn
 
 
@@ -170,6 +172,10 @@ def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any]]:
                 rotary = axis in ROTARY
                 scale = 1.0 / DEGREE if rotary else 1.0
                 arrays[f"{stem}/{name}_{axis}_{'deg' if rotary else 'mm'}{unit}"] = values[:, k] * scale
+        arrays[f"{stem}/settling_time_s"] = case.settling_time  # after the end of the motion
+        for k, axis in enumerate(case.axes):
+            scale, unit = (1.0 / DEGREE, "deg") if axis in ROTARY else (1.0, "mm")
+            arrays[f"{stem}/settling_{axis}_{unit}"] = case.settling[:, k] * scale
         arrays[f"{stem}/command_contour_error_mm"] = case.command_error
         arrays[f"{stem}/contour_error_mm"] = case.drive_error
         arrays[f"{stem}/tool_contour_error_mm"] = case.tool_error

@@ -25,7 +25,7 @@ LONGEST_LINE = 60  # characters of a program line that are shown
 CAPTIONS = {
     "path": "The programmed path (grey) and the tool, its distance to the path magnified.",
     "error": "Contour error over time, at the tool and at the drives.",
-    "vibration": "Deflection of the structure between drive and tool: all the while, and after the end.",
+    "vibration": "Deflection of the structure between drive and tool.",
     "motion": "Speed and acceleration of the command.",
     "shapers": "Left: the impulses. Right: the vibration a mode keeps where its real frequency is off.",
 }

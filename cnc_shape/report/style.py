@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ParamSpec
+
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+WIDTH = 7.2  # inch, two columns of a journal
 
 # Okabe and Ito's palette, ordered so that the first cases contrast most
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -22,6 +33,8 @@ RC: Any = {
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
+    "figure.constrained_layout.h_pad": 0.08,  # inch
+    "figure.constrained_layout.w_pad": 0.06,  # inch
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.0,
@@ -46,3 +59,35 @@ def look(index: int, width: float | None = None) -> dict[str, Any]:
         "linestyle": "-" if turns == 0 else (0, (4.0, 1.5 * turns)),
         "linewidth": width or max(1.5 - 0.25 * index, 0.8),  # what lies below stays visible
     }
+
+
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Draw in our own style, whatever the style of the process is."""
+
+    @functools.wraps(draw)
+    def styled(*arguments: P.args, **named: P.kwargs) -> Figure:
+        import matplotlib as mpl
+
+        with mpl.rc_context(RC):
+            return draw(*arguments, **named)
+
+    return styled
+
+
+def new_figure(
+    width: float,
+    height: float,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    sharex: bool = False,
+    sharey: bool = False,
+) -> tuple[Figure, list[Axes]]:
+    """A figure without a window, inch by inch, and its axes row by row."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
+    return figure, list(grid.ravel())

@@ -179,16 +179,17 @@ def build_table(summary: Summary, width: int) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    shown, stacked = columns(summary), False
+    shown, stacked, gap = columns(summary), False, 3
     names = [one_line(case.name) for case in summary.cases]
-    if _width(names, shown, stacked=False) > width:
-        stacked, names = True, [_stacked_name(name) for name in names]
-        while _width(names, shown, stacked=True) > width and len(shown) > 1:
+    if _width(names, shown, gap, stacked=False) > width:
+        stacked, names = True, [name.replace("+", "\n+ ") for name in names]
+        gap = 2 if _width(names, shown, 2, stacked=True) <= width else 1
+        while _width(names, shown, gap, stacked=True) > width and len(shown) > 1:
             shown = shown[:-1]
     table = Table(
-        title=Text(one_line(f"{summary.program} on {summary.machine}")),
+        title=Text(one_line(f"{summary.program} on {summary.machine}") + "\n"),
         caption=Text(
-            f"contour error: RMS {'above' if stacked else '/'} maximum over all samples; "
+            f"\ncontour error: RMS {'above' if stacked else '/'} maximum over all samples; "
             "vibration after the end and following error (RMS) of the worst axis"
         ),
         box=box.SIMPLE_HEAD,
@@ -197,7 +198,7 @@ def build_table(summary: Summary, width: int) -> Table:
         title_style="bold",
         caption_style="dim",
         header_style="",
-        padding=(0, _gap(stacked=stacked) - 1, 0, 0),  # the box itself draws one more
+        padding=(0, gap - 1, 0, 0),  # the box itself draws one more
         pad_edge=False,
         show_edge=False,
     )
@@ -226,20 +227,12 @@ def _laid_out(column: Column, *, stacked: bool) -> list[str]:
     ]
 
 
-def _stacked_name(name: str) -> str:
-    return name.replace("+", "\n+ ")
-
-
-def _gap(*, stacked: bool) -> int:
-    return 1 if stacked else 3
-
-
-def _width(names: Sequence[str], shown: Sequence[Column], *, stacked: bool) -> int:
+def _width(names: Sequence[str], shown: Sequence[Column], gap: int, *, stacked: bool) -> int:
     """How wide the table is."""
     total = max(len(line) for name in [*names, "case"] for line in name.split("\n"))
     for column in shown:
         lines = [line for cell in _laid_out(column, stacked=stacked) for line in cell.split("\n")]
-        total += _gap(stacked=stacked) + max(map(len, [column.name, column.unit, *lines]))
+        total += gap + max(map(len, [column.name, column.unit, *lines]))
     return total
 
 

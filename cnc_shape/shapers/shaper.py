@@ -87,7 +87,7 @@ def make_shaper(times: ArrayLike, amplitudes: ArrayLike) -> Shaper:
 
 
 def convolve(shapers: Sequence[Shaper]) -> Shaper:
-    """Run a command through one shaper after the other: every sum of their times, every product of amplitudes."""
+    """Run a command through one shaper after the other: all sums of times, all products of amplitudes."""
     times, amplitudes = np.zeros(1), np.ones(1)
     for shaper in shapers:
         times = np.add.outer(times, shaper.times).ravel()

@@ -84,7 +84,6 @@ def publishing(path: Path | str, *, force: bool = False) -> Generator[BinaryIO]:
         with _faults_of(target):
             os.rename(temporary, target)
     except BaseException:
-        sink.abandon()
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
@@ -178,20 +177,16 @@ class _Sink(io.FileIO):
     def __init__(self, temporary: Path, target: Path) -> None:
         super().__init__(temporary, "xb")
         self._target = target
-        self._abandoned = False
+        self._failed = False
 
     def write(self, data: ReadableBuffer, /) -> int:
-        if self._abandoned:
+        if self._failed:
             return memoryview(data).nbytes
         try:
             return os.write(self.fileno(), data)
         except OSError as fault:
-            self._abandoned = True
+            self._failed = True
             raise _refusal(self._target, fault) from fault
-
-    def abandon(self) -> None:
-        """Discard whatever is still buffered."""
-        self._abandoned = True
 
 
 def _beside(target: Path) -> Path:
