@@ -85,6 +85,17 @@ def test_chords_are_the_longest_that_keep_the_tolerance(seed):
     assert_array_equal(kept.start, points[naive.chords(points, 0.003, WINDOW)])
 
 
+@given(st.integers(0, 10**6))
+@settings(max_examples=40)
+def test_chords_do_not_run_back(seed):
+    """Steps in all directions, within the tolerance: only progress along the chord limits it."""
+    rng = np.random.default_rng(seed)
+    points = np.vstack([np.zeros(3), np.cumsum(rng.normal([3e-4, 0.0, 0.0], 2e-4, size=(20, 3)), axis=0)])
+    kept = straighten(lines(points, merge_tolerance=0.004))
+    if not kept.stop[1:-1].any():
+        assert_array_equal(kept.start, points[naive.chords(points, 0.004, WINDOW)])
+
+
 def test_a_straight_of_many_blocks_is_few_chords():
     edges = straighten(lines(np.column_stack([0.01 * np.arange(1281), np.zeros(1281)])))
     assert len(edges) == 1280 // WINDOW + 1
