@@ -131,7 +131,7 @@ def planning(limits: Sequence[Limits]) -> PlanningStep:
         if last:
             return None, profile
         rest = whole.cut(slice(final, None))
-        limit_before = float(limit_v2[final - 1]) if final else before.before_v2
+        limit_before = float(limit_v2[final - 1, 1]) if final else before.before_v2
         return PlanningState((rest,), frozen(clock), limit_before, 2 * len(rest) + PATIENCE), profile
 
     return step

@@ -13,7 +13,8 @@ from typing import TypeAlias
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels.polyline import merge, polygonize
+from cnc_shape.kernels.chords import merge
+from cnc_shape.kernels.polyline import polygonize
 from cnc_shape.toolpath import Toolpath
 
 LARGEST_MERGE_SHARE = 0.5  # -, of the path tolerance: merging leaves the corners their half
@@ -77,7 +78,7 @@ class PolylineState:
     memory: FloatArray  # (1+d,)
     flags: IntArray  # (5,)
     position: FloatArray  # (d,) reached by the last row
-    arc_length: float  # mm, there
+    place: float  # mm, of that on the toolpath
     line: int  # of the last row
 
 
@@ -115,71 +116,68 @@ def polyline(merging: Merging) -> PolylineStep:
             toolpath.feed_rate, toolpath.dwell, toolpath.path_mode, tolerance, toolpath.arc_length,
             toolpath.line, memory, flags,
         )  # fmt: skip
-        row = np.where(marks[3] < 0, -1 - marks[3], marks[3])
+        row = np.abs(marks[3]) - 1
         fine, coarse = _merge_tolerances(toolpath.merge_tolerance[row], values[2], merging)
-        values = np.vstack([values, fine, coarse, (marks[3] >= 0) & (marks[2] == 0)])
+        values = np.vstack([values, fine, coarse, (marks[3] > 0) & (marks[2] == 0)])
         if state:
             start, end = np.vstack([state.start, start]), np.vstack([state.end, end])
             values, marks = np.hstack([state.values, values]), np.hstack([state.marks, marks])
-        values, marks = np.ascontiguousarray(values), np.ascontiguousarray(marks)
         first, after, distance = merge(
             start, end, values[2], values[6], values[7], values[4], marks[1], values[8].astype(np.int64), last
         )
-        done = int(after[-1]) if after.size else 0
-        columns = [
-            start[first],
-            end[after - 1],
-            values[0][first],
-            values[0][after - 1] + values[1][after - 1] - values[0][first],
-            values[2][first] - np.maximum(values[3][first], distance),
-            values[4][first],
-            values[5][first],
-            marks[0][first],
-            marks[1][first],
-            marks[2][first],
-        ]
+        chords = _chords(start, end, values, marks, first, after - 1, distance)
         if len(toolpath):
-            position, arc_length, line = (
-                toolpath.end[-1],
-                float(toolpath.arc_length[-1]),
-                int(toolpath.line[-1]),
-            )
+            place, line = float(toolpath.arc_length[-1]), int(toolpath.line[-1])
+            position = toolpath.end[-1]
         elif state:
-            position, arc_length, line = state.position, state.arc_length, state.line
+            position, place, line = state.position, state.place, state.line
         else:
-            return None, _polyline(columns)
+            return None, chords
         if last:
-            rest = [
-                position[None],
-                position[None],
-                [arc_length],
-                [0.0],
-                [0.0],
-                [np.inf],
-                [memory[0]],
-                [line],
-                [1],
-                [0],
-            ]
-            return None, _polyline(
-                [np.concatenate([column, row]) for column, row in zip(columns, rest, strict=True)]
-            )
-        kept = PolylineState(
-            start[done:],
-            end[done:],
-            values[:, done:],
-            marks[:, done:],
-            memory,
-            flags,
-            position,
-            arc_length,
-            line,
-        )
-        return kept, _polyline(columns)
+            return None, join([chords, _rest(position, place, line, float(memory[0]))])
+        held = slice(int(after[-1]) if after.size else 0, None)
+        columns = (start[held], end[held], values[:, held], marks[:, held])
+        return PolylineState(*columns, memory, flags, position, place, line), chords
 
     return step
 
 
-def _polyline(columns: Sequence[FloatArray]) -> Polyline:
-    floats = [frozen(column) for column in columns[:7]]
-    return Polyline(*floats, *(frozen_integers(column) for column in columns[7:]))
+def _chords(
+    start: FloatArray,
+    end: FloatArray,
+    values: FloatArray,
+    marks: IntArray,
+    first: IntArray,
+    last: IntArray,
+    distance: FloatArray,
+) -> Polyline:
+    """Edges from the starts of `first` to the ends of `last`, at most `distance` from what they replace."""
+    return Polyline(
+        start=frozen(start[first]),
+        end=frozen(end[last]),
+        place=frozen(values[0][first]),
+        travel=frozen(values[0][last] + values[1][last] - values[0][first]),
+        tolerance=frozen(values[2][first] - np.maximum(values[3][first], distance)),
+        feed_rate=frozen(values[4][first]),
+        dwell=frozen(values[5][first]),
+        line=frozen_integers(marks[0][first]),
+        stop=frozen_integers(marks[1][first]),
+        alone=frozen_integers(marks[2][first]),
+    )
+
+
+def _rest(position: FloatArray, place: float, line: int, dwell: float) -> Polyline:
+    """Edge of no length at the end of the program."""
+    here = frozen(position[None])
+    return Polyline(
+        start=here,
+        end=here,
+        place=frozen([place]),
+        travel=frozen([0.0]),
+        tolerance=frozen([0.0]),
+        feed_rate=frozen([np.inf]),
+        dwell=frozen([dwell]),
+        line=frozen_integers([line]),
+        stop=frozen_integers([1]),
+        alone=frozen_integers([0]),
+    )

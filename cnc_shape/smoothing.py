@@ -16,16 +16,8 @@ import numpy as np
 
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import OptionError
-from cnc_shape.kernels.hats import (
-    LONGEST_BLEND,
-    LONGEST_BLEND_RATIO,
-    ROUNDS,
-    TICK,
-    cells,
-    edges,
-    turns,
-    widths,
-)
+from cnc_shape.kernels.cells import cells
+from cnc_shape.kernels.hats import LONGEST_BLEND, LONGEST_BLEND_RATIO, ROUNDS, TICK, edges, turns, widths
 from cnc_shape.polyline import Merging, Polyline, PolylineState, join, polyline
 from cnc_shape.toolpath import Toolpath
 
@@ -158,24 +150,26 @@ def _advance(
 ) -> tuple[Path, Polyline, int, int]:
     """Cells of all edges from `done` on that nothing to come can change; and the edges to keep."""
     ticks, tangent = edges(line.start, line.end, line.alone)
-    u = np.concatenate([[0], np.cumsum(ticks)[:-1]])
+    u: IntArray = np.cumsum(ticks) - ticks
     turn, twist = turns(tangent, line.stop)
     width = widths(u, line.tolerance, turn, twist, line.stop)
     stops = np.flatnonzero(line.stop)
-    longest = min(
-        LONGEST_BLEND, LONGEST_BLEND_RATIO * float(line.tolerance[np.isfinite(line.tolerance)].max())
-    )
+    longest = min(LONGEST_BLEND, LONGEST_BLEND_RATIO * float(line.tolerance.max()))
     reach = int((LONGEST_BLEND + (4 * ROUNDS + 8) * longest) / TICK)
     finish = len(line)
     if not last:
-        settled = int(np.searchsorted(u, u[-1] - reach, side="right")) - 1
+        settled = int((u <= u[-1] - reach).sum()) - 1
         finish = max(done, settled, int(stops[-1]) if stops.size else 0)
-    edge, offset, length, rows = cells(line.start, u, ticks, tangent, turn, twist, width, done, finish)
-    edge, offset, length, rows = _with_rests(line, ticks, edge, offset, length, rows, done, finish)
+    places, rows = cells(line.start, u, ticks, tangent, turn, twist, width, done, finish)
+    if last:  # the edge without length at the end of the program is a cell as well
+        places = np.vstack([places, [[len(line) - 1, 0, 0]]])
+        rows = np.concatenate([rows, np.zeros((1, *rows.shape[1:]))])
+        rows[-1, 0] = line.start[-1]
+    edge, offset, length = (frozen_integers(column) for column in places.T)
 
-    anchor = np.maximum.accumulate(np.where(line.stop == 1, u, -origin))  # where u is zero
-    first = offset == 0
-    travelled = np.where(line.alone == 1, 0.0, line.travel)
+    anchor: IntArray = np.maximum.accumulate(np.where(line.stop == 1, u, -origin))  # where u is zero
+    first: BoolArray = offset == 0
+    travelled: FloatArray = np.where(line.alone == 1, 0.0, line.travel)
     stretch = travelled / (np.maximum(ticks, 1) * TICK)
     path = Path(
         axes=axes,
@@ -191,38 +185,9 @@ def _advance(
     )
     if finish == len(line):
         return path, line, finish, 0
-    stop = (
-        int(stops[np.searchsorted(stops, finish, side="right") - 1])
-        if stops.size and stops[0] <= finish
-        else 0
-    )
-    keep = max(stop, int(np.searchsorted(u, u[finish] - reach)) - 2, 0)
+    passed: IntArray = stops[stops <= finish]
+    keep = max(int(passed[-1]) if passed.size else 0, int((u < u[finish] - reach).sum()) - 2)
     return path, line.cut(slice(keep, None)), finish - keep, int(u[keep] - anchor[keep])
-
-
-def _with_rests(
-    line: Polyline,
-    ticks: IntArray,
-    edge: IntArray,
-    offset: IntArray,
-    length: IntArray,
-    rows: FloatArray,
-    begin: int,
-    finish: int,
-) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-    """Insert a cell of length 0 for each edge without length: the end of the program."""
-    empty = begin + np.flatnonzero(ticks[begin:finish] == 0)
-    if empty.size == 0:
-        return edge, offset, length, rows
-    place = np.searchsorted(edge, empty)
-    rest = np.zeros((empty.size, *rows.shape[1:]))
-    rest[:, 0] = line.start[empty]
-    return (
-        np.insert(edge, place, empty),
-        np.insert(offset, place, 0),
-        np.insert(length, place, 0),
-        np.insert(rows, place, rest, axis=0),
-    )
 
 
 def _frozen_flags(values: BoolArray) -> BoolArray:

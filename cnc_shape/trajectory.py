@@ -107,26 +107,28 @@ def sample(profile: Profile, sample_time: float) -> Trajectory:
 
 
 def _pieces(profile: Profile, begin: int, end: int) -> Profile:
-    """Return a view of some pieces; of just one, with its cell alone, so that no chunk is kept alive for it."""
+    """Return a view of some pieces; of one piece with its cell alone, so that it can outlive its chunk."""
     path, cell = profile.path, profile.cell[begin:end]
     if end - begin == 1:
         k = int(cell[0])
         path, cell = path.cut(slice(k, k + 1)), frozen_integers(np.zeros(1))
-    columns = (
-        profile.time,
-        profile.duration,
-        profile.u,
-        profile.velocity,
-        profile.acceleration,
-        profile.jerk,
+    cut = slice(begin, end)
+    return Profile(
+        path=path,
+        time=profile.time[cut],
+        duration=profile.duration[cut],
+        u=profile.u[cut],
+        velocity=profile.velocity[cut],
+        acceleration=profile.acceleration[cut],
+        jerk=profile.jerk[cut],
+        cell=cell,
     )
-    return Profile(path, *(column[begin:end] for column in columns), cell)
 
 
 def _blocks(
     profile: Profile, until: float, first: int, sample_time: float, block: int
 ) -> Iterator[Trajectory]:
-    """Samples from number `first` on that lie in the pieces and before `until` s, block by block; at least one."""
+    """Yield the samples from number `first` on that lie before `until` s; at least one block."""
     path = profile.path
     piece = 0
     while True:

@@ -138,3 +138,182 @@ def delayed_sum(time, sample_time, position, velocity, shaper, delay):
         a * curve(np.clip(time - t - delay, 0, end))
         for t, a in zip(shaper.times, shaper.amplitudes, strict=True)
     )
+
+
+# --- planner: polyline, hats, time law, samples ------------------------------------------------------
+
+
+def deviations(toolpath, points, at, reach):
+    """Distance of each point to the programmed curve within `reach` mm of its own place on it."""
+    vertices, along = [], []
+    for row in range(len(toolpath)):
+        if toolpath.arc_length[row + 1] > toolpath.arc_length[row]:
+            shares = np.linspace(0.0, 1.0, 2 if toolpath.kind[row] != 2 else 4001)
+            vertices.append(curve_points(toolpath, row, shares))
+            along.append(places(toolpath, row, shares))
+    vertices, along = np.concatenate(vertices), np.concatenate(along)
+    a, b = vertices[:-1], vertices[1:]
+    chord = b - a
+    square = np.maximum((chord * chord).sum(axis=1), 1e-300)
+    distance = np.empty(len(points))
+    for n, (point, place) in enumerate(zip(points[:, :3], at, strict=True)):
+        near = slice(
+            np.searchsorted(along[1:], place - reach),
+            np.searchsorted(along[:-1], place + reach, side="right"),
+        )
+        arm = point - a[near]
+        share = np.clip((arm * chord[near]).sum(axis=1) / square[near], 0.0, 1.0)
+        distance[n] = np.sqrt(((arm - share[:, None] * chord[near]) ** 2).sum(axis=1).min())
+    return distance
+
+
+def chords(points, tolerance, window):
+    """Greedy chords over the vertices `points`: indices of the vertices that stay."""
+    kept, first = [0], 0
+    while first < len(points) - 1:
+        best = first + 1
+        for last in range(first + 2, min(first + window, len(points) - 1) + 1):
+            chord = points[last] - points[first]
+            inner = points[first + 1 : last] - points[first]
+            progress = inner @ chord / (chord @ chord)
+            off = np.linalg.norm(inner - progress[:, None] * chord, axis=1)
+            if (np.diff(np.concatenate([[0.0], progress, [1.0]])) < 0.0).any() or (off > tolerance).any():
+                break
+            best = last
+        kept.append(best)
+        first = best
+    return kept
+
+
+def hat_sums(u, width, size):
+    """Sum over all hats of ``size l (1 - |x|)^3 / 6`` at every vertex; and how many others reach it."""
+    x = np.abs(u[:, None] - u[None, :]) / np.where(width > 0.0, width, 1.0)
+    reaches = (x < 1.0) & (width > 0.0) & (size > 0.0)
+    terms = np.where(reaches, size * width * (1.0 - np.minimum(x, 1.0)) ** 3 / 6.0, 0.0)
+    return terms.sum(axis=1), reaches.sum(axis=1) - np.diag(reaches)
+
+
+def hat_widths(u, budget, size, first_width, rounds, shrink):
+    """Rounds of Lipschitz limit and shrinking, between two ends that have no hat; all pairs looked at."""
+    width = first_width.copy()
+    between = 0.5 * np.abs(u[:, None] - u[None, :])
+
+    def limited(width):
+        inner = width[1:-1]
+        return np.concatenate([[0.0], (inner[None, :] + between[1:-1, 1:-1]).min(axis=1), [0.0]])
+
+    for number in range(rounds):
+        width = limited(width)
+        total, others = hat_sums(u, width, size)
+        excess = np.where((others > 0) & (budget > 0.0), total / np.where(budget > 0.0, budget, 1.0), 0.0)
+        factor = np.where(
+            excess > 1.0 + 1e-9,
+            shrink / np.maximum(excess, 1e-300) ** (1.0 if number == rounds - 1 else 0.5),
+            1.0,
+        )
+        if (factor == 1.0).all():
+            break
+        reaches = np.abs(u[:, None] - u[None, :]) < width[None, :]
+        least = np.where(reaches, factor[:, None], 1.0).min(axis=0)
+        width = np.where(size > 0.0, width * least, width)
+    return limited(width)
+
+
+def hat_path(points, tangent, u, width, at):
+    """Points of ``P(u) + sum_i D_i l_i (1 - |x|)^3 / 6`` at the parameters `at`, by the formula itself."""
+    edge = np.clip(np.searchsorted(u, at, side="right") - 1, 0, len(tangent) - 1)
+    q = points[edge] + tangent[edge] * (at - u[edge])[:, None]
+    for i in range(1, len(tangent)):
+        if width[i] > 0.0:
+            x = np.abs(at - u[i]) / width[i]
+            q += np.where(x < 1.0, width[i] * (1.0 - np.minimum(x, 1.0)) ** 3 / 6.0, 0.0)[:, None] * (
+                tangent[i] - tangent[i - 1]
+            )
+    return q
+
+
+def cell_rows(coefficients, h):
+    """Rows ``alpha a + beta x0`` of one cell whose size must stay below the axis's acceleration."""
+    first, second, third = coefficients[1], 2.0 * coefficients[2], 6.0 * coefficients[3]
+    end1, end2 = first + h * second + 0.5 * h * h * third, second + h * third
+    alpha = np.concatenate([first, first + 1.5 * h * second, end1 + 2.0 * h * end2])
+    beta = np.concatenate([second, 0.5 * (second + end2), end2])
+    return alpha, beta
+
+
+def fastest(path, limit_v2, acceleration):
+    """Squared speeds at the nodes by linear programs, one a cell: backward, then forward, from rest."""
+    from scipy.optimize import linprog
+
+    n = len(path)
+    cap = np.minimum(np.append(limit_v2[:, 0], 0.0), np.concatenate([[0.0], limit_v2[:, 1]]))
+    cap[:n][path.stop] = 0.0
+    cap[n] = 0.0
+
+    def best(k, x0, x1, sense):
+        h = path.length[k]
+        alpha, beta = cell_rows(path.coefficients[k], h)
+        bound = np.tile(acceleration, 3)
+        left = np.vstack(
+            [np.column_stack([alpha, beta]), -np.column_stack([alpha, beta]), [2 * h, 1], [-2 * h, -1]]
+        )
+        right = np.concatenate([bound, bound, [x1, 0.0]])
+        cost = [0.0, -1.0] if sense == "backward" else [-1.0, 0.0]
+        scale = np.array([1000.0, 1000.0])
+        result = linprog(
+            np.array(cost) * scale, left * scale, right, bounds=[(None, None), (x0[0] / 1e3, x0[1] / 1e3)]
+        )
+        a, x = result.x * scale
+        return x if sense == "backward" else x0[0] + 2 * h * a
+
+    reach = np.zeros(n + 1)
+    for k in range(n - 1, -1, -1):
+        if path.length[k] > 0.0:
+            reach[k] = best(k, (0.0, cap[k]), reach[k + 1], "backward")
+    speed = np.zeros(n + 1)
+    for k in range(n):
+        if path.length[k] > 0.0:
+            speed[k + 1] = best(k, (speed[k], speed[k]), reach[k + 1], "forward")
+    return reach, speed
+
+
+def samples(profile, times):
+    """Position, velocity and acceleration at `times`, each from the piece it lies in, by powers."""
+    piece = np.clip(np.searchsorted(profile.time, times, side="right") - 1, 0, len(profile) - 1)
+    result = []
+    for t, m in zip(times, piece, strict=True):
+        e = t - profile.time[m]
+        a, j = profile.acceleration[m], profile.jerk[m]
+        s = np.polyval([j / 6, a / 2, profile.velocity[m], profile.u[m]], e)
+        v, b = np.polyval([j / 2, a, profile.velocity[m]], e), np.polyval([j, a], e)
+        c = profile.path.coefficients[profile.cell[m]]
+        first, second = c[1] + 2 * c[2] * s + 3 * c[3] * s**2, 2 * c[2] + 6 * c[3] * s
+        result.append([c[0] + c[1] * s + c[2] * s**2 + c[3] * s**3, first * v, first * b + second * v**2])
+    return np.array(result).transpose(1, 0, 2)
+
+
+def excesses(profile, limits, points):
+    """Largest ratio of velocity, acceleration and feed to their limits, piece by piece."""
+    worst = np.zeros(3)
+    for m in range(len(profile)):
+        k = profile.cell[m]
+        times = profile.time[m] + profile.duration[m] * np.linspace(0.0, 1.0, points)
+        e = times - profile.time[m]
+        v = profile.velocity[m] + profile.acceleration[m] * e
+        s = profile.u[m] + profile.velocity[m] * e + 0.5 * profile.acceleration[m] * e**2
+        c = profile.path.coefficients[k]
+        first = c[1] + np.outer(s, 2 * c[2]) + np.outer(s**2, 3 * c[3])
+        second = 2 * c[2] + np.outer(s, 6 * c[3])
+        velocity = first * v[:, None]
+        acceleration = first * profile.acceleration[m] + second * (v**2)[:, None]
+        alone = profile.path.stretch[k] == 0.0
+        feed = np.linalg.norm(velocity[:, 3:] if alone else velocity[:, :3], axis=1)
+        worst = np.maximum(
+            worst,
+            [
+                max((np.abs(velocity) / [limit.velocity for limit in limits]).max(), 0.0),
+                (np.abs(acceleration) / [limit.acceleration for limit in limits]).max(),
+                feed.max() / profile.path.feed_rate[k],
+            ],
+        )
+    return worst

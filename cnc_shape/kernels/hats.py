@@ -23,8 +23,6 @@ LONGEST_BLEND_RATIO = 300.0  # -, the same over the tolerance
 ROTARY_BLEND_TOLERANCE = 9e-4  # rad, deviation of a rotary axis by rounding
 ROUNDS = 9  # of fitting the widths; the last is a guarantee
 SHRINK = 0.999
-LARGEST_TURN = 0.15  # rad of turn in a cell
-MOST_CELLS = 8  # in a span between two knots
 
 
 @kernel
@@ -73,7 +71,10 @@ def turns(tangent, stop):
 
 @kernel
 def lipschitz(u, width):
-    """Limit the widths, in ticks: neighbours differ by at most half their distance, so supports stay in order."""
+    """Let neighbouring widths, in ticks, differ by half their distance at most.
+
+    So the supports begin and end in the order of their vertices.
+    """
     n = width.size
     for k in range(1, n):
         width[k] = min(width[k], width[k - 1] + ((u[k] - u[k - 1]) >> 1))
@@ -189,132 +190,3 @@ def widths(u, tolerance, turn, twist, stop):
             lipschitz(u[segment + 1 : k], width[segment + 1 : k])
             segment = k
     return width
-
-
-@kernel
-def grown(array):
-    """Return `array` with room for twice as many rows."""
-    larger = np.empty((2 * array.shape[0], array.shape[1]))
-    larger[: array.shape[0]] = array
-    return larger
-
-
-@kernel
-def sum_hats(at, center, half, step, low, high, sums):
-    """Add to the powers `sums` (4,d) at `at` the hats `low` to `high`, which all reach beyond it."""
-    for j in range(low, high):
-        l = half[j] * TICK
-        side = -1.0 if center[j] <= at else 1.0
-        y = 1.0 - abs(at - center[j]) / half[j]
-        zeroth = l * y * y * y / 6.0
-        first = side * y * y * 0.5
-        second = y * 0.5 / l
-        third = side / (6.0 * l * l)
-        for i in range(sums.shape[1]):
-            sums[0, i] += step[j, i] * zeroth
-            sums[1, i] += step[j, i] * first
-            sums[2, i] += step[j, i] * second
-            sums[3, i] += step[j, i] * third
-
-
-@kernel
-def parts_of(sums, h):
-    """Return into how many cells a span of length `h` is cut, by the angle it turns through.
-
-    A rotary axis counts by the relative change of its rate.
-    """
-    first = 0.0
-    second = 0.0
-    bend = 0.0
-    for i in range(sums.shape[1]):
-        begin = 2.0 * sums[2, i]
-        finish = begin + 6.0 * sums[3, i] * h
-        if i < 3:
-            first += begin * begin
-            second += finish * finish
-        else:
-            rise = max(abs(begin), abs(finish)) * h
-            if rise > 1e-9:
-                bend = max(bend, rise / (abs(sums[1, i]) + rise))
-    bend = max(bend, np.sqrt(max(first, second)) * h)
-    return min(MOST_CELLS, max(1, int(np.ceil(bend / LARGEST_TURN))))
-
-
-@kernel
-def cells(start, u, ticks, tangent, turn, twist, width, begin, finish):
-    """Cubic cells from vertex `begin` to vertex `finish`, every one summed afresh from the hats over it.
-
-    Returns
-    -------
-    edge (c,)
-        Edge the cell lies on.
-    offset, length (c,)
-        Start of the cell after the edge's start, and its length, in ticks.
-    rows (c,4,d)
-        Coefficients of the powers 0 to 3.
-    """
-    n, d = start.shape
-    hats = 0
-    center = np.empty(n, np.int64)
-    half = np.empty(n, np.int64)
-    step = np.empty((n, d))
-    for k in range(1, n):
-        if width[k] > 0 and turn[k] + twist[k] > 0.0:
-            center[hats] = u[k]
-            half[hats] = width[k]
-            for i in range(d):
-                step[hats, i] = tangent[k, i] - tangent[k - 1, i]
-            hats += 1
-    capacity = 1024
-    edge = np.empty(capacity, np.int64)
-    offset = np.empty(capacity, np.int64)
-    length = np.empty(capacity, np.int64)
-    rows = np.empty((capacity, 4, d))
-    sums = np.empty((4, d))
-    count = 0
-    low = 0  # first hat that ends after `here`
-    high = 0  # first hat that starts after `here`
-    for k in range(begin, finish):
-        here = u[k]
-        until_edge = u[k] + ticks[k]
-        while here < until_edge:
-            while low < hats and center[low] + half[low] <= here:
-                low += 1
-            high = max(high, low)
-            while high < hats and center[high] - half[high] <= here:
-                high += 1
-            until = until_edge
-            if high < hats:
-                until = min(until, center[high] - half[high])
-            if low < high:
-                until = min(until, center[low] + half[low])
-            span = until - here
-            parts = np.int64(0)
-            part = np.int64(0)
-            at = here
-            while at < until:
-                e = (at - u[k]) * TICK
-                for i in range(d):
-                    sums[0, i] = start[k, i] + tangent[k, i] * e
-                    sums[1, i] = tangent[k, i]
-                    sums[2, i] = 0.0
-                    sums[3, i] = 0.0
-                sum_hats(at, center, half, step, low, high, sums)
-                if parts == 0:
-                    parts = min(span, parts_of(sums, span * TICK))
-                part += 1
-                to = here + (span * part) // parts
-                if count == capacity:
-                    edge = np.concatenate((edge, edge))
-                    offset = np.concatenate((offset, offset))
-                    length = np.concatenate((length, length))
-                    rows = np.concatenate((rows, rows))
-                    capacity *= 2
-                edge[count] = k
-                offset[count] = at - u[k]
-                length[count] = to - at
-                rows[count] = sums
-                count += 1
-                at = to
-            here = until
-    return edge[:count], offset[:count], length[:count], rows[:count]

@@ -8,7 +8,7 @@ from cnc_shape.kernels import kernel
 
 @kernel
 def point(rows, s, v, a, position, velocity, acceleration):
-    """Position, velocity and acceleration of the axes at `s` in a cell, at path speed v and acceleration a."""
+    """Position, velocity and acceleration of the axes at `s` in a cell; path speed v, acceleration a."""
     for i in range(position.size):
         c0 = rows[0, i]
         c1 = rows[1, i]

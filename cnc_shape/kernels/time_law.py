@@ -21,7 +21,8 @@ STRAIGHT_TURN = 1e-9  # -, change of q' in a cell that is taken as straight
 STRAIGHT_SHARE = 1e-7  # -, of the acceleration limit that the curvature of such a cell may use
 FULL_SPEED = 0.98  # -, |q'| from which the feed itself is the limit: |q'| <= 1 up to rounding
 ROUNDING = 2e-7  # -, of |q'|
-FASTEST = 1e6  # mm/s or rad/s, where nothing else limits
+STRAIGHT_ROUNDING = 1e-10  # -, the same on lines; more means a line so short that its own length counts
+FASTEST_V2 = 1e12  # mm^2/s^2 or rad^2/s^2, where nothing else limits
 MARGIN = 1e-9  # -, by which the scan must clear the next node's speed to be called independent of it
 NO_LENGTH = 1e-13  # -, of a cell: a shorter piece is rounding
 NO_RATE = 1e-12  # -, a smaller factor of `a` leaves only x to limit
@@ -39,62 +40,108 @@ def ends(rows, h, d1, d2, e1, e2):
 
 
 @kernel
+def add_square(first, middle, last, square):
+    """Add to `square` (5,) the Bernstein coefficients of the square of a quadratic with these three."""
+    square[0] += first * first
+    square[1] += first * middle
+    square[2] += (2.0 * middle * middle + first * last) / 3.0
+    square[3] += middle * last
+    square[4] += last * last
+
+
+@kernel
+def largest_product(square, start, end):
+    """Bound of `square` (5,) times the line from `start` to `end`, by its Bernstein coefficients."""
+    most = 0.0
+    for k in range(6):
+        value = 0.0
+        if k < 5:
+            value += (5 - k) * start * square[k]
+        if k > 0:
+            value += k * end * square[k - 1]
+        most = max(most, value / 5.0)
+    return most
+
+
+@kernel
 def speed_limits(rows, length, feed_rate, alone, velocity, acceleration):
-    """Squared speed limit and straight acceleration of every cell.
+    """Squared speed limits and straight acceleration of every cell.
+
+    An axis's velocity squared is ``q'^2 x`` with x linear: of degree 5. Limits at both ends are lowered
+    together until its Bernstein coefficients, and those of the feed, are within their limits.
 
     Returns
     -------
-    limit_v2 (k,)
-        From the axes' velocities and the feed.
+    limit_v2 (k,2)
+        From the axes' velocities and the feed, at both ends of the cell.
     straight (k,)
         Path acceleration on a straight cell; 0 on a curved one.
     """
     count = length.size
     d = velocity.size
-    limit_v2 = np.empty(count)
+    limit_v2 = np.empty((count, 2))
     straight = np.zeros(count)
     d1 = np.empty(d)
     d2 = np.empty(d)
     e1 = np.empty(d)
     e2 = np.empty(d)
+    square = np.empty(5)
+    path = np.empty(5)  # |q'|^2 of the axes that count for the feed
     for k in range(count):
         h = length[k]
         ends(rows[k], h, d1, d2, e1, e2)
-        speed = FASTEST
-        first = 0.0
-        middle = 0.0
-        last = 0.0
+        path[:] = 0.0
+        curved = False
+        start = FASTEST_V2
+        end = FASTEST_V2
         for i in range(d):
-            most = max(abs(d1[i]), abs(e1[i]))
-            third = 6.0 * rows[k, 3, i]
-            if third != 0.0:
-                at = -d2[i] / third
-                if 0.0 < at < h:
-                    most = max(most, abs(d1[i] + 0.5 * at * d2[i]))
-            if most > 0.0:
-                speed = min(speed, velocity[i] / most)
+            curved = curved or d2[i] != 0.0 or e2[i] != 0.0
             if (i < 3) != (alone[k] == 1):
-                first += d1[i] ** 2
-                middle += (d1[i] + 0.5 * h * d2[i]) ** 2
-                last += e1[i] ** 2
-        stretch = np.sqrt(max(first, middle, last))
-        if FULL_SPEED < stretch <= 1.0 + ROUNDING:
-            stretch = 1.0
-        if stretch > 0.0:
-            speed = min(speed, feed_rate[k] / stretch)
-        limit_v2[k] = speed * speed
+                add_square(d1[i], d1[i] + 0.5 * h * d2[i], e1[i], path)
+            if d1[i] != 0.0:
+                start = min(start, (velocity[i] / d1[i]) ** 2)
+            if e1[i] != 0.0:
+                end = min(end, (velocity[i] / e1[i]) ** 2)
+        stretch = np.sqrt(largest_product(path, 1.0, 1.0))
+        feed_v2 = feed_rate[k] ** 2
+        near = ROUNDING if curved else STRAIGHT_ROUNDING
+        full = (FULL_SPEED if curved else 1.0 - near) < stretch <= 1.0 + near
+        if full:
+            start = min(start, feed_v2)
+            end = min(end, feed_v2)
+        else:
+            if path[0] > 0.0:
+                start = min(start, feed_v2 / path[0])
+            if path[4] > 0.0:
+                end = min(end, feed_v2 / path[4])
+        if curved:
+            excess = 1.0 if full else largest_product(path, start, end) / feed_v2
+            for i in range(d):
+                square[:] = 0.0
+                add_square(d1[i], d1[i] + 0.5 * h * d2[i], e1[i], square)
+                excess = max(excess, largest_product(square, start, end) / velocity[i] ** 2)
+            if excess > 1.0:
+                start /= excess
+                end /= excess
+        else:
+            start = min(start, end)
+            end = start
+        limit_v2[k, 0] = start
+        limit_v2[k, 1] = end
         is_straight = True
         rate = np.inf
         for i in range(d):
             bend = max(abs(d2[i]), abs(e2[i]))
             if bend > 0.0 and (
-                bend * h > STRAIGHT_TURN or bend * limit_v2[k] > STRAIGHT_SHARE * acceleration[i]
+                bend * h > STRAIGHT_TURN or bend * max(start, end) > STRAIGHT_SHARE * acceleration[i]
             ):
                 is_straight = False
             if abs(d1[i]) > 0.0:
                 rate = min(rate, acceleration[i] / abs(d1[i]))
         if is_straight:
             straight[k] = rate
+            limit_v2[k, 0] = min(start, end)
+            limit_v2[k, 1] = limit_v2[k, 0]
     return limit_v2, straight
 
 
@@ -196,7 +243,7 @@ def backward(rows, length, stop, limit_v2, straight, acceleration, before_v2):
     slope = np.empty(3 * d)
     for k in range(count - 1, -1, -1):
         h = length[k]
-        cap = 0.0 if stop[k] == 1 else min(limit_v2[k], limit_v2[k - 1] if k > 0 else before_v2)
+        cap = 0.0 if stop[k] == 1 else min(limit_v2[k, 0], limit_v2[k - 1, 1] if k > 0 else before_v2)
         if stop[k] == 1 or h == 0.0:
             free[k] = 1
             continue
@@ -210,7 +257,7 @@ def backward(rows, length, stop, limit_v2, straight, acceleration, before_v2):
         x = min(cap, bounds(rows[k], h, acceleration, d1, d2, e1, e2, base, slope))
         own_next = 0.0
         if k < count - 1 and stop[k + 1] == 0:
-            own_next = min(limit_v2[k], limit_v2[k + 1])
+            own_next = min(limit_v2[k, 1], limit_v2[k + 1, 0])
         x = largest_start(x, own_next, h, base, slope)
         low, _, _, _ = window(x, base, slope)
         low = max(low, -x / (2.0 * h))
@@ -259,7 +306,7 @@ def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, reach_v
         if h > 0.0 and straight[k] > 0.0:
             a = straight[k]
             following = min(reach_v2[k + 1], x + 2.0 * a * h)
-            top = min(max(limit_v2[k], x, following), 0.5 * (x + following) + a * h)
+            top = min(max(limit_v2[k, 0], x, following), 0.5 * (x + following) + a * h)
             v0 = np.sqrt(x)
             vt = np.sqrt(top)
             v1 = np.sqrt(following)
@@ -272,7 +319,7 @@ def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, reach_v
                 steps[used, 2] = v0
                 steps[used, 3] = a
                 used += 1
-            if cruise > 0.0 and vt > 0.0 and (top >= limit_v2[k] or used == 0):
+            if cruise > 0.0 and vt > 0.0 and (top >= limit_v2[k, 0] or used == 0):
                 steps[used, 0] = cruise / vt
                 steps[used, 1] = rise
                 steps[used, 2] = vt
