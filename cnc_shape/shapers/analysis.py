@@ -103,8 +103,9 @@ def _end(excess: Callable[[FloatArray | float], FloatArray], ratios: FloatArray)
         return None
     first = int(outside[0])
     bracket = (float(ratios[first - 1]), float(ratios[first]))
-    found: Any = root_scalar(excess, bracket=bracket, method="brentq", xtol=1e-13, rtol=1e-13)
-    return float(found.root)
+    options: dict[str, Any] = {"method": "brentq", "xtol": 1e-13, "rtol": 1e-13}
+    find: Any = root_scalar
+    return float(find(excess, bracket=bracket, **options).root)
 
 
 def contour_factor(shaper: Shaper, modes: Sequence[Mode]) -> float:
