@@ -96,16 +96,15 @@ def insensitivity(
 
 def _end(excess: Callable[[FloatArray | float], FloatArray], ratios: FloatArray) -> float | None:
     """First crossing of `excess` from below along `ratios`, refined by Brent's method."""
-    from scipy.optimize import root_scalar  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
+    import scipy.optimize  # its functions have no types
 
     outside = np.flatnonzero(excess(ratios) > 0.0)
     if outside.size == 0:
         return None
     first = int(outside[0])
     bracket = (float(ratios[first - 1]), float(ratios[first]))
-    options: dict[str, Any] = {"method": "brentq", "xtol": 1e-13, "rtol": 1e-13}
-    find: Any = root_scalar
-    return float(find(excess, bracket=bracket, **options).root)
+    found: Any = scipy.optimize.brentq(excess, *bracket, xtol=1e-13, rtol=np.float64(1e-13))
+    return float(found)
 
 
 def contour_factor(shaper: Shaper, modes: Sequence[Mode]) -> float:
