@@ -59,8 +59,8 @@ _HOMES = {
 
 __all__ = [
     "Control", "CrossCoupling", "Feedforward", "Mode", "Smoothing", "__version__", "build_toolpath",
-    "contour_error", "design", "foot_windows", "load_machine", "plan", "plot", "read_program", "sample", "shape", "simulate",
-    "simulate_program", "smooth", "write_report",
+    "contour_error", "design", "foot_windows", "load_machine", "plan", "plot", "read_program", "sample",
+    "shape", "simulate", "simulate_program", "smooth", "write_report",
 ]  # fmt: skip
 
 

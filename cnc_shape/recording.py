@@ -103,7 +103,8 @@ class Recorder:
             command=parts[0], position=parts[1], tool=parts[2], velocity=parts[3], acceleration=parts[4],
             command_error=errors[0], drive_error=errors[1], tool_error=errors[2],
             foot=frozen(table[:, 5 * d + 1 : 5 * d + 4]), line=frozen_integers(table[:, -1]),
-            settling_time=frozen(np.arange(settling.shape[0], dtype=np.int64) * self._sample_time), settling=frozen(settling),
+            settling_time=frozen(np.arange(settling.shape[0], dtype=np.int64) * self._sample_time),
+            settling=frozen(settling),
         )  # fmt: skip
 
     def _width(self, count: int) -> int:

@@ -55,7 +55,7 @@ control:
   cross_coupling: {estimator: tangent, proportional_per_s: 80, integral_per_s2: 0, derivative: 0, form: vector, orientation_per_s: 0}
   jacobian_every: 1
 tools: [{number: 1, length_mm: 50, diameter_mm: 6}]
-"""  # noqa: E501  # as in the contract
+"""
 
 SMALL = "axes: {x: {limits: {velocity_mm_s: 100, acceleration_mm_s2: 1000}}}\n"
 

@@ -69,7 +69,11 @@ def design(
             raise OptionError(
                 f"{shaper} is for one mode, not {len(modes)}", hint="use cascade, or give one --frequency-hz"
             )
-        made = SINGLE_MODE[shaper](next(iter(modes))) if shaper in SINGLE_MODE else cascade(modes, SINGLE_MODE[of])
+        made = (
+            SINGLE_MODE[shaper](next(iter(modes)))
+            if shaper in SINGLE_MODE
+            else cascade(modes, SINGLE_MODE[of])
+        )
         options: dict[str, object] = {"of": of} if shaper == "cascade" else {}
         designs.append(_describe(axis, shaper, made, modes, options, vibration_tolerance))
     if json:
@@ -141,7 +145,7 @@ def _text(entry: dict[str, Any]) -> str:
             impulses,
             f"  duration {1e3 * entry['duration_s']:.3f} ms, delay {1e3 * entry['delay_s']:.3f} ms",
             f"  vibration left at the design point {max(entry['residual_vibration']):.1e}",
-            f"  at most {band['tolerance']:.0%} where the frequency is {band['low']:.4f} to {high} of the model's",
+            f"  at most {band['tolerance']:.0%} for {band['low']:.4f} to {high} of the modelled frequency",
             f"  sum |A| {entry['sum_abs_amplitude']:.4f}, largest running sum {entry['max_running_sum']:.4f}",
             f"  curve factor {entry['contour_factor']:+.4f} (tool error on a curve, of the unshaped one)",
         )

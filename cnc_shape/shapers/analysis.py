@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -96,15 +96,15 @@ def insensitivity(
 
 def _end(excess: Callable[[FloatArray | float], FloatArray], ratios: FloatArray) -> float | None:
     """First crossing of `excess` from below along `ratios`, refined by Brent's method."""
-    from scipy.optimize import root_scalar  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
+    from scipy.optimize import brentq  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
 
     outside = np.flatnonzero(excess(ratios) > 0.0)
     if outside.size == 0:
         return None
     first = int(outside[0])
     bracket = (float(ratios[first - 1]), float(ratios[first]))
-    found: Any = root_scalar(excess, bracket=bracket, method="brentq", xtol=1e-13, rtol=1e-13)
-    return float(found.root)
+    find = cast("Callable[..., float]", brentq)
+    return find(excess, *bracket, xtol=1e-13, rtol=1e-13)
 
 
 def contour_factor(shaper: Shaper, modes: Sequence[Mode]) -> float:
