@@ -91,7 +91,11 @@ def moving(
             )
         built, toolpath = build(built, chunk, last)
         smoothed, path = smooth(smoothed, toolpath, last)
-        planned, profile = plan(planned, path, last)
+        try:
+            planned, profile = plan(planned, path, last)
+        except InfeasibleError as error:
+            error.source = error.source or chunk.source
+            raise
         names = tuple(axis for axis, seen in zip(chunk.axes, moved, strict=True) if seen)
         pending: Toolpath | None = toolpath
         for (drawn, command), end in with_last(draw(sampled, profile, last)):
