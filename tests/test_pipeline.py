@@ -197,3 +197,22 @@ def test_a_program_that_moves_nothing_is_told():
     setup = load_machine(bundled("xy_stage.yaml"))
     with pytest.raises(InfeasibleError, match="moves nothing"):
         run(moving([program()], setup.machine, 0.01, 1e-3), setup, default_cases(setup), "empty.nc")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "gp_screw.gcode", "lcnc_arcspiral.ngc", "lcnc_cds.ngc", "lcnc_lathe_pawn.ngc", "ugs_communicator.nc",
+        "ugs_no_spaces.gcode", "cncjs_tball_pocket_laser.gcode", "camotics_tiger.nc", "ugs_rotation.ngc",
+        "webgcode_pycam.ngc",
+    ],
+)  # fmt: skip
+def test_real_programs_run_through_and_keep_their_tolerance(shared, name):
+    setup = load_machine(bundled("xy_stage.yaml"))
+    path = shared / "data" / "gcode" / "programs" / name
+    summary = simulate_program(path, setup, ["unshaped"], record=False).summary
+    (case,) = summary.cases
+    assert 0.0 < case.command.max <= 0.01 * (1 + 1e-9)  # no G64 P in any of them: the machine's 0.01 mm
+    naive = json.loads((path.parent / f"{name}.expected.json").read_text())
+    assert summary.cycle_time > 0.9 * naive["feed_time_s"]
+    assert np.isfinite([case.tool.max, case.drives.rms, *case.residual_vibration.values()]).all()
