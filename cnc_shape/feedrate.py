@@ -18,7 +18,8 @@ import numpy as np
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.kernels.sampling import excesses
-from cnc_shape.kernels.time_law import backward, forward, speed_limits
+from cnc_shape.kernels.speed_limits import speed_limits
+from cnc_shape.kernels.time_law import backward, forward
 from cnc_shape.limits import Limits
 from cnc_shape.smoothing import Path, join_paths
 

@@ -15,7 +15,8 @@ from scipy.interpolate import CubicSpline
 from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import Profile, plan, planning, rotary_only, worst_violation
-from cnc_shape.kernels.time_law import backward, speed_limits
+from cnc_shape.kernels.speed_limits import speed_limits
+from cnc_shape.kernels.time_law import backward
 from cnc_shape.limits import Limits
 from cnc_shape.program import PathMode
 from cnc_shape.smoothing import Path, Smoothing, join_paths, smooth
