@@ -120,6 +120,7 @@ def test_simulate_reads_standard_input(place):
         (["apply", "part.nc"], ".nc program is not built yet"),
         (["apply", "part.nc", "-o", "out.nc"], ".nc is not built yet"),
         (["apply", "part.nc", "-o", "out"], "a file without suffix"),
+        (["apply", "part.nc", "-o", "part.nc"], ".nc is not built yet"),
         (["apply", "part.nc", "-o", "absent/out.csv"], "the folder absent does not exist"),
         (["design", "zw", "--frequency-hz", "30"], "unknown shaper 'zw'"),
         (["design", "zv"], "which mode?"),
@@ -236,6 +237,13 @@ def test_apply_never_overwrites(place, capfd):
     capfd.readouterr()
     assert "exists" in refused(capfd, "apply", "points.csv")
     assert run(["apply", "points.csv", "--force"]) == 0
+
+
+def test_samples_and_json_do_not_share_standard_output(place, capfd):
+    assert (
+        "both want standard output"
+        in answer(capfd, "apply", "part.nc", "-o", "-", code=2)["error"]["message"]
+    )
 
 
 def test_apply_writes_to_standard_output(place, capfd):

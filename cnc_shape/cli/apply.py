@@ -35,8 +35,11 @@ def apply(
     from cnc_shape.cli.progress import announce_compilation, progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
+    from cnc_shape.errors import OptionError
     from cnc_shape.opening import open_motion
 
+    if json and output == "-":
+        raise OptionError("--json and -o - both want standard output", hint="name a file for the samples")
     target = _target(file, output, force=force)
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
