@@ -22,6 +22,7 @@ from cnc_shape.kernels.foot_point import feet, pack, points_at, stack_boxes
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.segments import NO_SEGMENTS, Segments, join, segments, since
 from cnc_shape.toolpath import Toolpath
+from cnc_shape.units import MICROMETRE
 
 BACKTRACK = 0.1  # mm of path kept for commands that run backwards by rounding, or between samples
 
@@ -44,6 +45,13 @@ class ContourError:
     def max(self) -> float:
         """Largest distance, mm."""
         return float(self.distance.max(initial=0.0))
+
+    def summary(self) -> str:
+        """RMS, maximum and its source line, in one line."""
+        found = tally(Tally(), self)
+        place = "" if found.line is None else f", line {found.line}"
+        rms, highest = found.rms / MICROMETRE, found.max / MICROMETRE
+        return f"contour error {rms:.3g} µm RMS, {highest:.3g} µm at most{place}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +107,10 @@ def foot_windows(
 
 
 def contour_error(
-    position: FloatArray, toolpath: Toolpath, lower: FloatArray, upper: FloatArray
+    position: FloatArray,
+    toolpath: Toolpath,
+    lower: FloatArray | None = None,
+    upper: FloatArray | None = None,
 ) -> ContourError:
     """Distance of positions to the toolpath, each within its own window.
 
@@ -110,13 +121,16 @@ def contour_error(
     toolpath
         The programmed path. Moves without XYZ travel are passed over. Open paths clamp at their ends.
     lower, upper
-        (n,) mm, window on ``toolpath.arc_length``; whole path: ``-inf`` and ``inf``.
+        (n,) mm, window on ``toolpath.arc_length``, from `foot_windows`; None: no bound.
 
     Raises
     ------
     ValueError
         An empty toolpath, or arrays of unlike length.
     """
+    everywhere = np.full(position.shape[0], np.inf)
+    lower = -everywhere if lower is None else lower
+    upper = everywhere if upper is None else upper
     if not lower.shape == upper.shape == position.shape[:1]:
         raise ValueError(f"{position.shape=} {lower.shape=} {upper.shape=}")
     (error,) = _measure((position,), segments(toolpath, first=True), frozen(lower), frozen(upper))

@@ -41,6 +41,13 @@ class Response:
         """Command minus drives, (n,d) mm or rad."""
         return self.command.position - self.position
 
+    def summary(self) -> str:
+        """Largest following error and deflection of every axis, in one line."""
+        following = np.abs(self.following_error).max(axis=0, initial=0.0)
+        deflection = np.abs(self.tool - self.position).max(axis=0, initial=0.0)
+        told = zip(self.command.axes, following.tolist(), deflection.tolist(), strict=True)
+        return "; ".join(f"{axis.upper()} follows to {f:.4g}, bends by {d:.4g}" for axis, f, d in told)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SimulationState:

@@ -33,6 +33,12 @@ class Trajectory:
     def __len__(self) -> int:
         return self.arc_length.size
 
+    def summary(self) -> str:
+        """Length in time and place, in one line."""
+        axes = ", ".join(axis.upper() for axis in self.axes)
+        travel = float(self.arc_length[-1] - self.arc_length[0]) if len(self) else 0.0
+        return f"{len(self)} samples of {axes} every {self.sample_time * 1e3:g} ms along {travel:.3f} mm"
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SamplingState:

@@ -36,6 +36,12 @@ class Shaper:
         """Second moment of the impulses about their centroid, s^2: what bends curves inward."""
         return float(self.amplitudes @ (self.times - self.delay) ** 2)
 
+    def summary(self) -> str:
+        """Impulses and duration, in one line."""
+        pairs = zip(self.times.tolist(), self.amplitudes.tolist(), strict=True)
+        impulses = ", ".join(f"{amplitude:.4g} at {1e3 * time:.4g} ms" for time, amplitude in pairs)
+        return f"{self.times.size} impulses over {1e3 * self.duration:.4g} ms: {impulses}"
+
     @property
     def sum_abs_amplitude(self) -> float:
         """``sum |A_i|``: the largest gain on velocity and acceleration of any command."""
