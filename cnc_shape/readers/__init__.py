@@ -29,6 +29,7 @@ class Curve(Enum):
 
     POLYLINE = "polyline"
     SPLINE = "spline"
+    CIRCLE = "circle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +68,8 @@ def gcode_reading(source: Source, options: ReadingOptions) -> Reading:
 
 def table_reading(source: Source, options: ReadingOptions) -> Reading:
     """Read way-points, or a time trajectory where the header has a time."""
-    if options.curve is Curve.SPLINE:
-        raise OptionError("--path spline is not built yet", hint="take --path polyline")
+    if options.curve is not Curve.POLYLINE:
+        raise OptionError(f"--path {options.curve.value} is not built yet", hint="take --path polyline")
     header = read_header(source)
     count = sum(1 for _ in lines(source))
     if TIME in header.names:
