@@ -154,7 +154,7 @@ def _start(plant: Plant, command: Trajectory, control: Control) -> SimulationSta
         np.zeros(3),
         _rows(command, slice(0, 0)),
         0.0,
-        np.zeros(axes),
+        np.zeros((0, axes)),
     )
 
 

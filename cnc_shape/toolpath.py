@@ -10,7 +10,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.program import ROTARY, Motion, Program
+from cnc_shape.program import ROTARY, XYZ, Motion, Program
 from cnc_shape.units import DEGREE
 
 
@@ -57,11 +57,15 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.column_stack([a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)])
 
 
+NO_TRAVEL = 1e-9  # mm, XYZ travel below which a move that turns rotary axes is one of these alone
+
+
 def travel_lengths(program: Program) -> FloatArray:
     """XYZ length of every programmed move, (m,) mm: chords, arcs, helices and spirals.
 
     The radius of an arc whose ends differ goes linearly with the angle from start to end; its length
-    is the integral of ``sqrt(r^2 + (dr/dphi)^2 + (dz/dphi)^2)`` over the sweep.
+    is the integral of ``sqrt(r^2 + (dr/dphi)^2 + (dz/dphi)^2)`` over the sweep. Where rotary axes turn, less
+    than `NO_TRAVEL` is the rounding of increments, and counts as none.
     """
     start = _starts(program)
     chord = program.target[:, :3] - start[:, :3]
@@ -75,6 +79,8 @@ def travel_lengths(program: Program) -> FloatArray:
             program.normal[arcs],
             program.sweep[arcs],
         )
+    if len(program.axes) > len(XYZ):
+        length[(length < NO_TRAVEL) & (rotary_travel(program) > 0.0)] = 0.0
     return length
 
 

@@ -104,7 +104,9 @@ def test_the_default_folder_goes_with_what_was_run(tmp_path, monkeypatch, quick)
     assert len({folder, default_folder(RUN, replace(CONTEXT, machine="name: other\n"))}) == 2
     monkeypatch.chdir(tmp_path)
     write_report(RUN, folder, CONTEXT)
-    write_report(RUN, folder, CONTEXT)  # its name says what it holds: it may take its own place
+    with pytest.raises(OutputError, match="exists"):
+        write_report(RUN, folder, CONTEXT)
+    write_report(RUN, folder, CONTEXT, force=True)
     assert set(content(folder)) == FILES
 
 

@@ -163,3 +163,8 @@ def test_modes_that_are_none_are_refused(frequency, damping):
 def test_a_tolerance_outside_its_range_is_refused():
     with pytest.raises(OptionError, match="between 0 and 1"):
         insensitivity(zv(Mode(1.0, 0.0)), [Mode(1.0, 0.0)], 1.0)
+
+
+def test_modes_that_do_not_bend_the_tool_have_no_contour_factor():
+    assert contour_factor(zv(Mode(30.0, 0.0)), [Mode(30.0, 0.0, 0.0)]) is None
+    assert contour_factor(zv(Mode(30.0, 0.0)), []) is None

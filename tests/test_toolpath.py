@@ -13,6 +13,7 @@ from paths import arc, dwell, line, program
 from programs import chunks, read
 
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.readers import read_program
 from cnc_shape.readers.gcode import GcodeOptions
 from cnc_shape.toolpath import Toolpath, build_toolpath, building, check_travel, extent, travel_lengths
 
@@ -142,3 +143,11 @@ def test_rotary_travel_is_told_in_degrees():
     turned = program(line(0.0, 0.0, 0.0, math.pi), axes=("x", "y", "z", "a"))
     with pytest.raises(InfeasibleError, match="A reaches 180°, beyond its travel of -90 to 90°"):
         check_travel(turned, {"a": (-math.pi / 2, math.pi / 2)})
+
+
+def test_increments_that_cancel_to_rounding_leave_the_rotary_axes_alone(tmp_path):
+    text = "G21 G90\nG91 G1 X0.1 F600\nX0.2\nG90 X0.3 A90 F600\nM2\n"  # 0.1 + 0.2 is not 0.3
+    (tmp_path / "part.nc").write_text(text)
+    read = read_program(tmp_path / "part.nc")
+    assert travel_lengths(read)[-1] == 0.0
+    assert_allclose(read.feed_rate[-1], np.deg2rad(600.0) / 60.0)

@@ -138,6 +138,8 @@ def _text(entry: dict[str, Any]) -> str:
     impulses = "\n".join(
         f"  {1e3 * t:10.4f} ms   {a:+.6f}" for t, a in zip(entry["times_s"], entry["amplitudes"], strict=True)
     )
+    factor = entry["contour_factor"]
+    curve = "none: these modes do not bend" if factor is None else f"{factor:+.4f}"
     where = f"{entry['axis']}: " if entry["axis"] else ""
     return "\n".join(
         (
@@ -147,6 +149,6 @@ def _text(entry: dict[str, Any]) -> str:
             f"  vibration left at the design point {max(entry['residual_vibration']):.1e}",
             f"  at most {band['tolerance']:.0%} for {band['low']:.4f} to {high} of the modelled frequency",
             f"  sum |A| {entry['sum_abs_amplitude']:.4f}, largest running sum {entry['max_running_sum']:.4f}",
-            f"  curve factor {entry['contour_factor']:+.4f} (tool error on a curve, of the unshaped one)",
+            f"  curve factor {curve} (tool error on a curve, of the unshaped one)",
         )
     )

@@ -68,8 +68,7 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
     run
         Summary and signals, one set of signals a case.
     folder
-        The folder to make. One under ``cnc-shape-runs`` may take the place of an older one, since its name
-        says what it holds.
+        The folder to make; one under ``cnc-shape-runs`` may be the first there.
     context
         What the run was made from.
     force
@@ -115,10 +114,9 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
         with (target / "signals.npz").open("wb") as file:
             write_archive(file, signal_arrays(run.signals))
 
-    ours = folder.parent.name == RUNS
-    if ours:
+    if folder.parent.name == RUNS:
         make_folder(folder.parent)
-    publish_folder(folder, build, marker=MARKER, force=force or ours)
+    publish_folder(folder, build, marker=MARKER, force=force)
     return folder / "report.html"
 
 

@@ -153,6 +153,7 @@ def _safe(style: str) -> str:
 
 
 def _shaper_row(axis: str, shaper: Shaper, modes: Sequence[Mode]) -> tuple[str, ...]:
+    factor = contour_factor(shaper, modes)
     return (
         axis.upper(),
         ", ".join(f"{mode.natural_frequency:g} Hz (ζ {mode.damping_ratio:g})" for mode in modes) or "-",
@@ -160,5 +161,5 @@ def _shaper_row(axis: str, shaper: Shaper, modes: Sequence[Mode]) -> tuple[str, 
         f"{shaper.duration * 1e3:.2f}",
         f"{shaper.delay * 1e3:.2f}",
         f"{shaper.sum_abs_amplitude:.3f}",
-        f"{contour_factor(shaper, modes):+.3f}" if modes else "-",
+        "-" if factor is None else f"{factor:+.3f}",
     )

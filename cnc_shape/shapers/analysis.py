@@ -107,11 +107,12 @@ def _end(excess: Callable[[FloatArray | float], FloatArray], ratios: FloatArray)
     return find(excess, *bracket, xtol=1e-13, rtol=1e-13)
 
 
-def contour_factor(shaper: Shaper, modes: Sequence[Mode]) -> float:
+def contour_factor(shaper: Shaper, modes: Sequence[Mode]) -> float | None:
     """Tool error on a curve over the unshaped one: ``kappa = 1 - sigma^2 / (2 sum_k g_k / omega_k^2)``.
 
     The shaper pulls a curve inward by half its variance times the acceleration, the structure pushes the
-    tool outward by ``sum g/omega^2`` times it; kappa is what is left, as a share of the latter.
+    tool outward by ``sum g/omega^2`` times it; kappa is what is left, as a share of the latter. A structure
+    that does not push (no modes, or shares that cancel) has none.
     """
     compliance = sum(mode.participation / mode.omega**2 for mode in modes)
-    return 1.0 - shaper.variance / (2.0 * compliance)
+    return 1.0 - shaper.variance / (2.0 * compliance) if compliance != 0.0 else None
