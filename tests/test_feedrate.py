@@ -209,6 +209,35 @@ def test_random_programs_keep_every_limit(seed, limits):
     assert np.isfinite(profile.end_time)
 
 
+def test_a_row_that_does_not_see_the_path_acceleration_limits_the_speed_alone():
+    """At the end of a blend after which Z rests, q' goes with the square of what is left, q'' with itself.
+
+    So ``q'_1 + 2 h q''_1`` is 0 four cells before it, but for rounding: solved for `a` it has no digits left.
+    """
+    points = [
+        [0.08573, -0.09149, -1e-5], [-1.08355, 2.15954, -0.866], [-11.98819, 13.06444, -0.866],
+        [46.7657, 30.48611, -0.866],
+    ]  # fmt: skip
+    limits = [Limits(50.0, 5000.0), Limits(50.0, 2000.0), Limits(50.0, 2000.0)]
+    assert_keeps(planned(lines(points, [np.inf, 1000.0, 1000.0]), limits), limits)
+
+
+@settings(max_examples=30)
+@given(
+    st.integers(0, 10**6),
+    st.sampled_from([400.0, 2000.0]),
+    st.sampled_from([50.0, 200.0]),
+    st.sampled_from([0.001, 0.01, 0.1]),
+)
+def test_axes_that_come_to_rest_in_a_blend_keep_every_limit(seed, weakest, velocity, tolerance):
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(size=(60, 4)) * [3.0, 3.0, 3.0, 0.05] * (rng.random((60, 4)) < 0.6)
+    points = np.vstack([np.zeros(4), np.cumsum(steps, axis=0)])
+    limits = [Limits(velocity, a) for a in (5000.0, 2000.0, weakest, 10.0)]
+    whole = lines(points, 1000.0, axes=("x", "y", "z", "a"))
+    assert_keeps(planned(whole, limits, tolerance), limits)
+
+
 def test_the_certificate_is_that_of_a_plain_loop():
     profile = planned(toolpath(line(3, 0), arc((5, 2, 0), (3, 2, 0), np.pi / 2), line(5, 6), line(8, 6.5)))
     found = worst_violation(profile, MILL, 9)

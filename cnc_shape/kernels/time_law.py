@@ -20,15 +20,20 @@ from cnc_shape.kernels.speed_limits import ends
 
 MARGIN = 1e-9  # -, by which the scan must clear the next node's speed to be called independent of it
 NO_LENGTH = 1e-13  # -, of a cell: a shorter piece is rounding
-NO_RATE = 1e-12  # -, a smaller factor of `a` leaves only x to limit
+STEEPEST = 1e7  # -, base of a line over the smallest one, from which the line limits x alone
+SLACK = 4.0 / STEEPEST  # -, of the limit, left for the term that such a line drops
 MOST_STEPS = 60  # of Newton, on a gap of at most 6 d pieces
 
 
 @kernel
 def bounds(rows, h, acceleration, d1, d2, e1, e2, base, slope):
-    """Lines ``|a - slope x| <= base`` of a curved cell, 3 d of them; returns the limit of x by itself."""
+    """Lines ``|a - slope x| <= base`` of a curved cell, 3 d of them; returns the limit of x by itself.
+
+    Where the factor of `a` vanishes but for rounding, the line is so steep that `a` would have no digits
+    left. Such a row limits x alone, with some slack for what `a` could add.
+    """
     ends(rows, h, d1, d2, e1, e2)
-    cap = np.inf
+    least = np.inf
     for i in range(d1.size):
         for r in range(3):
             if r == 0:
@@ -40,15 +45,20 @@ def bounds(rows, h, acceleration, d1, d2, e1, e2, base, slope):
             else:
                 p = e1[i] + 2.0 * h * e2[i]
                 s = e2[i]
-            n = 3 * i + r
-            if abs(p) > NO_RATE:
-                base[n] = acceleration[i] / abs(p)
-                slope[n] = -s / p
-            else:
-                base[n] = np.inf
-                slope[n] = 0.0
-                if s != 0.0:
-                    cap = min(cap, acceleration[i] / abs(s))
+            base[3 * i + r] = acceleration[i] / p
+            slope[3 * i + r] = s
+            least = min(least, abs(base[3 * i + r]))
+    cap = np.inf
+    for n in range(base.size):
+        limit = acceleration[n // 3]
+        if abs(base[n]) < STEEPEST * least and abs(base[n]) < np.inf:
+            slope[n] *= -base[n] / limit
+            base[n] = abs(base[n])
+        else:
+            if slope[n] != 0.0:
+                cap = min(cap, (1.0 - SLACK) * limit / abs(slope[n]))
+            base[n] = np.inf
+            slope[n] = 0.0
     return cap
 
 
