@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 
 from cnc_shape.errors import OptionError
 from cnc_shape.units import TWO_PI
+
+LOWEST_FREQUENCY = 1e-3  # Hz
+HIGHEST_FREQUENCY = 1e5  # Hz
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,15 @@ class Mode:
     frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative to it
 
     def __post_init__(self) -> None:
+        if (
+            LOWEST_FREQUENCY > self.natural_frequency > 0.0
+            or inf > self.natural_frequency > HIGHEST_FREQUENCY
+        ):
+            raise OptionError(
+                f"a mode's frequency must lie between {LOWEST_FREQUENCY:g} and {HIGHEST_FREQUENCY:g} Hz, "
+                f"not {self.natural_frequency:g} Hz",
+                hint="give the undamped natural frequency in Hz",
+            )
         if not (isfinite(self.natural_frequency) and self.natural_frequency > 0.0):
             raise OptionError(
                 f"a mode's frequency must be positive, not {self.natural_frequency} Hz",

@@ -38,6 +38,7 @@ from cnc_shape.simulation import SimulationState, simulating
 WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
 WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
 WINDOW_AHEAD = 1.5  # of the position loop's time constant 1/Kp
+SLOWEST_LOOP = 2.5  # s, time constant beyond which the window grows no more
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +167,7 @@ class Trial:
     def _window(self, machine: Machine) -> tuple[int, int]:
         """Samples back and ahead of its own within which a sample's place on the path is sought."""
         lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
-        settling = 1.0 / self.case.control.position_gain if lags else 0.0
+        settling = min(1.0 / self.case.control.position_gain, SLOWEST_LOOP) if lags else 0.0
         rate = 1.0 / self.case.control.sample_time
         return (
             ceil((WINDOW_BACK * settling + self._longest) * rate) + 1,

@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cnc_shape.cli import run
+from cnc_shape.cli.errors import Terminated, guarded
 from cnc_shape.cli.gate import parse_gate
 from cnc_shape.errors import OptionError
 
@@ -126,6 +127,12 @@ def test_simulate_reads_standard_input(place):
         (["design", "zv"], "which mode?"),
         (["design", "zv", "--frequency-hz", "-3"], "frequency must be positive, not -3.0 Hz"),
         (["design", "zv", "--frequency-hz", "nan"], "frequency must be positive"),
+        (["design", "zv", "--frequency-hz", "1e-308"], "between 0.001 and 100000 Hz"),
+        (["design", "zv", "--frequency-hz", "1e308"], "between 0.001 and 100000 Hz"),
+        (
+            ["design", "cascade", *(w for f in range(25) for w in ("--frequency-hz", str(7 + f)))],
+            "more than 2048",
+        ),
         (["design", "zv", "--frequency-hz", "30", "--damping-ratio", "1"], "below 1, not 1.0"),
         (["design", "zv", "--frequency-hz", "30", "--frequency-hz", "40"], "zv is for one mode, not 2"),
         (
@@ -310,3 +317,24 @@ def test_gates_are_read_or_refused():
     for text in ("max_contour_um>1e999", "max_contour_um>nan", "max_contour_um=3", ">3"):
         with pytest.raises(OptionError):
             parse_gate(text)
+
+
+def test_a_loop_of_almost_no_gain_is_measured_in_bounded_memory(place, capfd):
+    (place / "slow.yaml").write_text(
+        "name: slow\naxes:\n  x:\n    limits: {velocity_mm_s: 100, acceleration_mm_s2: 1000}\n"
+        "    drive: {type: first_order_lag, time_constant_s: 0.01}\ncontrol: {position_gain_per_s: 1e-9}\n"
+    )
+    result = answer(capfd, "simulate", "part.nc", "-m", "slow.yaml")
+    assert result["cases"][0]["contour_max_um"] > 1000.0  # the axis hardly moves at all
+
+
+@pytest.mark.parametrize(("signal", "code"), [(KeyboardInterrupt, 130), (Terminated, 143)])
+def test_a_signal_in_compiled_code_is_an_interruption_and_no_bug(signal, code, capfd):
+    def wrapped() -> None:
+        try:
+            raise signal
+        except BaseException as inner:
+            raise SystemError("a compiled function returned a result with an exception set") from inner
+
+    assert guarded(wrapped, json=False) == code
+    assert "bug" not in capfd.readouterr().err

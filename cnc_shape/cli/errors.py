@@ -107,10 +107,24 @@ def _attempt(command: Callable[[], object], *, json: bool) -> int:
         if isinstance(error, _ClickException):
             report_error(_usage(error), json=json)
             return WRONG_INPUT
-        return _bug(error, json=json)
+        ended = _interruption(error)
+        if ended is None:
+            return _bug(error, json=json)
+        report_error(_InterruptedError("terminated" if ended == TERMINATED else "interrupted"), json=json)
+        return ended
     if status == INTERRUPTED:  # also what typer makes of a KeyboardInterrupt
         report_error(_InterruptedError("interrupted"), json=json)
     return status if isinstance(status, int) else DONE
+
+
+def _interruption(error: BaseException) -> int | None:
+    """Exit code of a signal that came while compiled code ran, which wraps it in an error of its own."""
+    inner = error.__cause__ or error.__context__
+    while inner is not None:
+        if isinstance(inner, KeyboardInterrupt | Terminated):
+            return TERMINATED if isinstance(inner, Terminated) else INTERRUPTED
+        inner = inner.__cause__ or inner.__context__
+    return None
 
 
 def _usage(error: Exception) -> OptionError:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.errors import OptionError
 
+MOST_IMPULSES = 2048  # of shapers that are convolved
 SUM_TOLERANCE = 1e-9  # -, how far from 1 the amplitudes a user gives may add up
 
 
@@ -93,9 +94,19 @@ def make_shaper(times: ArrayLike, amplitudes: ArrayLike) -> Shaper:
 
 
 def convolve(shapers: Sequence[Shaper]) -> Shaper:
-    """Run a command through one shaper after the other: all sums of times, all products of amplitudes."""
+    """Run a command through one shaper after the other: all sums of times, all products of amplitudes.
+
+    Raises
+    ------
+    OptionError
+        More than `MOST_IMPULSES` impulses together.
+    """
     times, amplitudes = np.zeros(1), np.ones(1)
     for shaper in shapers:
+        if times.size * shaper.times.size > MOST_IMPULSES:
+            raise OptionError(
+                f"the shapers have more than {MOST_IMPULSES} impulses together", hint="leave weak modes out"
+            )
         times = np.add.outer(times, shaper.times).ravel()
         amplitudes = np.multiply.outer(amplitudes, shaper.amplitudes).ravel()
         order = np.argsort(times, kind="stable")
