@@ -94,6 +94,11 @@ def test_position_offsets():  # G92 X0 here, then off, on again, gone
     assert [end[0] for end in ends(text)] == [10, 15, 5, 15, 5]
 
 
+def test_a_position_set_while_suspended_does_not_revive_the_others():
+    text = "G0 X10 Y10\nG92 X0 Y0\nG92.2\nG92 X0\nG0 X1 Y1\nG92.2\nG92.3\nG0 X2 Y2\nM2\n"
+    assert ends(text) == [[10, 10, 0], [11, 1, 0], [12, 2, 0]]
+
+
 def test_tool_length_moves_the_frame_not_the_machine():
     text = "T3 M6\nG43\nG0 Z10\nG43 H4\nG0 Z10\nG49\nG0 Z10\nM2\n"
     options = GcodeOptions(tools=(Tool(3, 50.0, 6.0), Tool(4, 20.0, 6.0)))

@@ -137,6 +137,8 @@ def _position_offset(code: int, block: Block, modal: Modal) -> None:
         given = take_axes(block, modal)
         if not given:
             raise BlockError("G92 needs an axis word", hint="write G92 X0", letter="G92")
+        if not modal.g92_active:
+            modal.g92 = [0.0] * len(AXES)  # what G92.2 suspended ends here: the other axes have no offset
         for axis, value in given.items():
             modal.g92[axis] = modal.position[axis] - modal.tool_offset[axis] - value
     elif code == codes.CLEAR_POSITION:
