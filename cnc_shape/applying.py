@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from math import ceil
 
 import numpy as np
 
@@ -17,9 +16,9 @@ from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.kernels.sums import largest_ratio
 from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
-from cnc_shape.pipeline import WINDOW_MARGIN, Deviation
+from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, window
 from cnc_shape.shapers import Shaper
-from cnc_shape.shapers.shaping import ShapingState, delays, shaping
+from cnc_shape.shapers.shaping import delays, shaping
 from cnc_shape.trajectory import Trajectory
 
 
@@ -56,7 +55,7 @@ class Application:
     def blocks(self) -> Iterator[Trajectory]:
         """Yield the shaped command, block by block."""
         shape = shaping(self._shapers, self._sample_time)
-        shaped: ShapingState | None = None
+        shaped: Trajectory | None = None
         measured: MeasuringState | None = None
         measure = velocity = acceleration = None
         for block in self._motion:
@@ -66,8 +65,7 @@ class Application:
                 velocity = frozen([limit.velocity for limit in limits])
                 acceleration = frozen([limit.acceleration for limit in limits])
                 self._longest = delays(self._shapers, self._axes, self._sample_time).longest
-                window = ceil(self._longest / self._sample_time) + 1
-                measure = measuring(window, window, WINDOW_MARGIN)
+                measure = measuring(*window(0.0, self._longest, self._sample_time), WINDOW_MARGIN)
             largest_ratio(block.command.velocity, velocity, self._plain)
             largest_ratio(block.command.acceleration, acceleration, self._plain)
             shaped, command = shape(shaped, block.command, block.last)
@@ -82,14 +80,13 @@ class Application:
 
     def summary(self) -> Applied:
         """What shaping made of the motion; call it after the last block."""
-        found = self._tally
         return Applied(
             self._cycle_time,
             self._cycle_time + self._longest,
             self._samples,
             self._sample_time,
             self._axes,
-            Deviation(found.rms, found.max, found.line),
+            deviation(self._tally),
             _excess(self._plain),
             float(self._shaped[0]),
         )

@@ -17,10 +17,9 @@ from cnc_shape.feedrate import planning
 from cnc_shape.machine import Machine
 from cnc_shape.program import Program
 from cnc_shape.smoothing import Smoothing, smoothing
-from cnc_shape.toolpath import Toolpath, building, check_travel, extent
+from cnc_shape.toolpath import Toolpath, building, check_travel
 from cnc_shape.trajectory import Trajectory, sampling
 
-SAMPLES_PER_BLOCK = 65_536
 STILL = 1e-9  # mm or rad, an axis that moves no farther does not move
 
 T = TypeVar("T")
@@ -75,15 +74,14 @@ def moving(
     build, smooth = building(), smoothing(Smoothing(path_tolerance))
     built = smoothed = planned = sampled = None
     plan = None
-    draw = sampling(sample_time, SAMPLES_PER_BLOCK)
+    draw = sampling(sample_time)
     moved = np.zeros(0, dtype=np.bool_)
     for chunk, last in with_last(program):
         if plan is None:
             machine = machine.with_axes(chunk.axes)
             plan = planning(tuple(axis.limits for axis in machine.axes))
             moved = np.zeros(len(chunk.axes), dtype=np.bool_)
-        check_travel(chunk, {axis.name: axis.limits.travel for axis in machine.axes})
-        low, high = extent(chunk)
+        low, high = check_travel(chunk, {axis.name: axis.limits.travel for axis in machine.axes})
         moved |= np.ptp(np.vstack([chunk.start, low, high]), axis=0) > STILL
         if last and not moved.any():
             raise InfeasibleError(

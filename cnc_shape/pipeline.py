@@ -16,8 +16,8 @@ numbers do not depend on where it was cut.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
 import numpy as np
@@ -32,8 +32,9 @@ from cnc_shape.machine import FirstOrderLag, Machine
 from cnc_shape.motion import Block
 from cnc_shape.recording import Outline, Recorder, Signals
 from cnc_shape.shapers import Shaper
-from cnc_shape.shapers.shaping import ShapingState, delays, shaping
+from cnc_shape.shapers.shaping import delays, shaping
 from cnc_shape.simulation import SimulationState, simulating
+from cnc_shape.trajectory import Trajectory
 
 WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
 WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
@@ -57,6 +58,20 @@ class Deviation:
     rms: float  # mm
     max: float  # mm
     line: int | None  # source line of the worst place
+
+
+def deviation(found: Tally) -> Deviation:
+    """What a tally has found."""
+    return Deviation(found.rms, found.max, found.line)
+
+
+def window(settling: float, longest: float, sample_time: float) -> tuple[int, int]:
+    """Samples back and ahead of its own within which a sample's place on the path is sought.
+
+    settling: time constant of the position loop, s, 0 for ideal drives; longest: of the shapers' delays, s.
+    """
+    back, ahead = WINDOW_BACK * settling + longest, WINDOW_AHEAD * settling + longest
+    return ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +106,6 @@ class Run:
     summary: Summary
     signals: tuple[Signals, ...]  # one a case, in the summary's order; empty where none were recorded
     path: FloatArray  # (p,3) mm, the programmed path, arcs chopped for drawing
-    moved: tuple[str, ...] = ()  # axes that the program moves
 
     def signal(self, case: str) -> Signals:
         """Return the signals of the case called `case`."""
@@ -100,12 +114,7 @@ class Run:
 
 def default_cases(setup: Setup) -> tuple[Case, ...]:
     """Rows of a machine's table: unshaped, shaped, then one row more per configured term."""
-    alone = Control(
-        sample_time=setup.control.sample_time,
-        position_gain=setup.control.position_gain,
-        delay_samples=setup.control.delay_samples,
-        feedforward=setup.control.feedforward,
-    )
+    alone = replace(setup.control, cross_coupling=None)
     shapers = setup.acting_shapers
     if not shapers:
         cases = [Case("independent", {}, alone)]
@@ -128,14 +137,10 @@ def pick_cases(setup: Setup, names: Sequence[str]) -> tuple[Case, ...]:
     """
     known = {case.name: case for case in default_cases(setup)}
     if setup.shapers:
-        shaped = next((case for case in known.values() if case.shapers), None)
-        plain = shaped.control if shaped else next(iter(known.values())).control
-        known["axis_shaped"] = Case("axis_shaped", setup.shapers, plain)
-        known["shaped-feedforward"] = Case(
-            "shaped-feedforward",
-            setup.shapers,
-            Control(plain.sample_time, plain.position_gain, plain.delay_samples),
-        )
+        alone = replace(setup.control, cross_coupling=None)
+        bare = replace(alone, feedforward=None)
+        known["axis_shaped"] = Case("axis_shaped", setup.shapers, alone)
+        known["shaped-feedforward"] = Case("shaped-feedforward", setup.shapers, bare)
     for name in names:
         if name in ("contour_shaped", "path_shaped"):
             raise OptionError(f"the case {name} is not built yet", hint="axis_shaped is")
@@ -155,24 +160,16 @@ class Trial:
         self._simulate = simulating(machine, case.control)
         axes = tuple(axis.name for axis in machine.axes)
         self._longest = delays(case.shapers, axes, case.control.sample_time).longest
-        self._measure = measuring(*self._window(machine), WINDOW_MARGIN)
-        self._shaped: ShapingState | None = None
+        lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
+        settling = min(1.0 / case.control.position_gain, SLOWEST_LOOP) if lags else 0.0
+        self._measure = measuring(*window(settling, self._longest, case.control.sample_time), WINDOW_MARGIN)
+        self._shaped: Trajectory | None = None
         self._simulated: SimulationState | None = None
         self._measured: MeasuringState | None = None
-        self._tallies = (Tally(), Tally(), Tally())
+        self._tallies = [Tally(), Tally(), Tally()]  # of the command, the drives, the tool
         self._following = np.zeros(len(axes))
         self._samples = 0
         self._cycle_time = 0.0
-
-    def _window(self, machine: Machine) -> tuple[int, int]:
-        """Samples back and ahead of its own within which a sample's place on the path is sought."""
-        lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
-        settling = min(1.0 / self.case.control.position_gain, SLOWEST_LOOP) if lags else 0.0
-        rate = 1.0 / self.case.control.sample_time
-        return (
-            ceil((WINDOW_BACK * settling + self._longest) * rate) + 1,
-            ceil((WINDOW_AHEAD * settling + self._longest) * rate) + 1,
-        )
 
     def advance(self, block: Block) -> None:
         """Run the next block through the case."""
@@ -186,7 +183,7 @@ class Trial:
         self._measured, errors = self._measure(
             self._measured, block.toolpath, response.command.arc_length, signals, block.last
         )
-        self._tallies = tuple(tally(state, error) for state, error in zip(self._tallies, errors, strict=True))  # pyright: ignore[reportAttributeAccessIssue]
+        self._tallies = [tally(state, error) for state, error in zip(self._tallies, errors, strict=True)]
         if self.recorder is not None:
             self.recorder.add(response, errors)
         if block.last:
@@ -203,7 +200,7 @@ class Trial:
         if self._simulated is None:
             raise ValueError("a case without a single block has no summary")
         axes = [axis.name for axis in self._machine.axes]
-        command, drives, tool = (Deviation(t.rms, t.max, t.line) for t in self._tallies)
+        command, drives, tool = (deviation(found) for found in self._tallies)
         following = {
             axis: sqrt(total / self._samples)
             for axis, total in zip(axes, self._following.tolist(), strict=True)
@@ -219,7 +216,6 @@ def run(
     program: str,
     *,
     record: bool = False,
-    progress: Callable[[Block], None] | None = None,
 ) -> Run:
     """Send a motion through every case and measure it.
 
@@ -235,8 +231,6 @@ def run(
         Its name in the table.
     record
         Keep the signals for a report.
-    progress
-        Told of every block that is done.
 
     Raises
     ------
@@ -245,7 +239,7 @@ def run(
     """
     trials: list[Trial] = []
     outline = Outline()
-    samples, cycle_time, moved = 0, 0.0, ()
+    samples, cycle_time = 0, 0.0
     for block in blocks:
         if not trials:
             axes = block.command.axes
@@ -259,12 +253,10 @@ def run(
         for trial in trials:
             trial.advance(block)
         samples += len(block.command)
-        cycle_time, moved = block.cycle_time, block.moved
-        if progress is not None:
-            progress(block)
+        cycle_time = block.cycle_time
     summary = Summary(
         program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
         tuple(trial.summary() for trial in trials),
     )  # fmt: skip
     signals = tuple(found for trial in trials if (found := trial.signals()) is not None)
-    return Run(summary, signals, outline.points(), moved)
+    return Run(summary, signals, outline.points())

@@ -19,7 +19,7 @@ from cnc_shape.controllers.stability import check_stability
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import Machine
 from cnc_shape.plant import Plant, discretise
-from cnc_shape.trajectory import Trajectory
+from cnc_shape.trajectory import Trajectory, join_trajectories
 
 RESIDUAL_PERIODS = 10.0  # of the slowest mode, watched after the end
 SHORTEST_RESIDUAL_TIME = 0.5  # s
@@ -105,7 +105,7 @@ def simulating(
                 command, command.position, command.position, command.position, command.position
             )
         now = _start(plant, command, control) if state is None else _copy(state)
-        command = _join(now.held, command)
+        command = join_trajectories([now.held, command])
         ticks = len(command) if last else max(len(command) - 1, 0)
         rest = command.position[-1:] if last else command.position[:0]
         position = np.concatenate([command.position, rest])
@@ -118,9 +118,9 @@ def simulating(
             still, shaken, _ = run(now, after, np.zeros_like(after))
             settling = np.vstack([tool[-1:] - joint[-1:], shaken - still])
         response = Response(
-            _rows(command, slice(0, ticks)), frozen(joint), frozen(joint), frozen(tool), frozen(drive)
+            command.cut(slice(0, ticks)), frozen(joint), frozen(joint), frozen(tool), frozen(drive)
         )
-        held = _rows(command, slice(ticks, None))
+        held = command.cut(slice(ticks, None))
         time = now.time + ticks * control.sample_time
         return SimulationState(now.plant, now.late, now.tangent, held, time, frozen(settling)), response
 
@@ -152,7 +152,7 @@ def _start(plant: Plant, command: Trajectory, control: Control) -> SimulationSta
         state,
         np.zeros((control.delay_samples, axes)),
         np.zeros(3),
-        _rows(command, slice(0, 0)),
+        command.cut(slice(0, 0)),
         0.0,
         np.zeros((0, axes)),
     )
@@ -161,28 +161,6 @@ def _start(plant: Plant, command: Trajectory, control: Control) -> SimulationSta
 def _copy(state: SimulationState) -> SimulationState:
     return SimulationState(
         state.plant.copy(), state.late.copy(), state.tangent.copy(), state.held, state.time, state.settling
-    )
-
-
-def _rows(command: Trajectory, rows: slice) -> Trajectory:
-    return Trajectory(
-        command.axes,
-        command.sample_time,
-        command.arc_length[rows],
-        command.position[rows],
-        command.velocity[rows],
-        command.acceleration[rows],
-    )
-
-
-def _join(first: Trajectory, second: Trajectory) -> Trajectory:
-    return Trajectory(
-        second.axes,
-        second.sample_time,
-        frozen(np.concatenate([first.arc_length, second.arc_length])),
-        frozen(np.concatenate([first.position, second.position])),
-        frozen(np.concatenate([first.velocity, second.velocity])),
-        frozen(np.concatenate([first.acceleration, second.acceleration])),
     )
 
 

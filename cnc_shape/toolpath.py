@@ -57,6 +57,7 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.column_stack([a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)])
 
 
+BEYOND = 1e-9  # mm or rad, by which a move may pass the end of a travel: rounding
 NO_TRAVEL = 1e-9  # mm, XYZ travel below which a move that turns rotary axes is one of these alone
 
 
@@ -222,8 +223,10 @@ def _arc_extent(
     return np.where(inside, value, np.inf).min(axis=2), np.where(inside, value, -np.inf).max(axis=2)
 
 
-def check_travel(program: Program, travel: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse the first move that leaves an axis's travel.
+def check_travel(
+    program: Program, travel: Mapping[str, tuple[float, float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Refuse the first move that leaves an axis's travel; return the extent of all moves.
 
     Raises
     ------
@@ -233,10 +236,10 @@ def check_travel(program: Program, travel: Mapping[str, tuple[float, float]]) ->
     low, high = extent(program)
     for column, axis in enumerate(program.axes):
         lower, upper = travel.get(axis, (-np.inf, np.inf))
-        outside = np.flatnonzero((low[:, column] < lower - 1e-9) | (high[:, column] > upper + 1e-9))
+        outside = np.flatnonzero((low[:, column] < lower - BEYOND) | (high[:, column] > upper + BEYOND))
         if outside.size:
             row = int(outside[0])
-            reached = low[row, column] if low[row, column] < lower - 1e-9 else high[row, column]
+            reached = low[row, column] if low[row, column] < lower - BEYOND else high[row, column]
             unit, key, scale = ("°", "travel_deg", DEGREE) if axis in ROTARY else (" mm", "travel_mm", 1.0)
             raise InfeasibleError(
                 f"{axis.upper()} reaches {reached / scale:.6g}{unit}, "
@@ -245,3 +248,4 @@ def check_travel(program: Program, travel: Mapping[str, tuple[float, float]]) ->
                 source=program.source,
                 line=int(program.line[row]),
             )
+    return low, high

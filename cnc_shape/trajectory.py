@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -32,6 +32,17 @@ class Trajectory:
 
     def __len__(self) -> int:
         return self.arc_length.size
+
+    def cut(self, rows: slice) -> Trajectory:
+        """Some of the samples."""
+        return Trajectory(
+            self.axes,
+            self.sample_time,
+            self.arc_length[rows],
+            self.position[rows],
+            self.velocity[rows],
+            self.acceleration[rows],
+        )
 
     def summary(self) -> str:
         """Length in time and place, in one line."""
@@ -99,17 +110,21 @@ def sampling(sample_time: float, block: int = BLOCK) -> SamplingStep:
     return step
 
 
+def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
+    """Consecutive chunks of one command, at least one, as one."""
+    return Trajectory(
+        parts[0].axes,
+        parts[0].sample_time,
+        frozen(np.concatenate([part.arc_length for part in parts])),
+        frozen(np.concatenate([part.position for part in parts])),
+        frozen(np.concatenate([part.velocity for part in parts])),
+        frozen(np.concatenate([part.acceleration for part in parts])),
+    )
+
+
 def sample(profile: Profile, sample_time: float) -> Trajectory:
     """Sample a whole profile at a period of `sample_time` s."""
-    blocks = [trajectory for _, trajectory in sampling(sample_time)(None, profile, True)]
-    return Trajectory(
-        profile.path.axes,
-        sample_time,
-        frozen(np.concatenate([block.arc_length for block in blocks])),
-        frozen(np.concatenate([block.position for block in blocks])),
-        frozen(np.concatenate([block.velocity for block in blocks])),
-        frozen(np.concatenate([block.acceleration for block in blocks])),
-    )
+    return join_trajectories([trajectory for _, trajectory in sampling(sample_time)(None, profile, True)])
 
 
 def _pieces(profile: Profile, begin: int, end: int) -> Profile:

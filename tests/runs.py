@@ -70,7 +70,7 @@ def make_run(samples: int = 4000, program: str = PROGRAM, machine: str = "XY sta
     ]
     summary = Summary(program, machine, cycle_time, dt, samples, tuple(case for _, case in parts))
     path = at(np.linspace(0.0, LENGTHS[-1], 2000))
-    return Run(summary, tuple(signals for signals, _ in parts), frozen(path), ("x", "y"))
+    return Run(summary, tuple(signals for signals, _ in parts), frozen(path))
 
 
 def _case(

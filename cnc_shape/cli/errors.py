@@ -18,7 +18,6 @@ from cnc_shape.report.text import one_line
 DONE: Final = 0
 GATE_FAILED: Final = 1
 WRONG_INPUT: Final = 2
-PARTLY_DONE: Final = 3
 BUG: Final = 70
 INTERRUPTED: Final = 130  # 128 + SIGINT
 BROKEN_PIPE: Final = 141  # 128 + SIGPIPE: whoever read the output has left

@@ -82,9 +82,7 @@ def simulate(
     warn(motion.warnings(), quiet=quiet)
     if json:
         extra = {} if page is None else {"report": str(page)}
-        print_json(
-            "simulate", {**{k: v for k, v in summary_json(result.summary).items() if k != "schema"}, **extra}
-        )
+        print_json(None, {**summary_json(result.summary), **extra})
     else:
         _print_table(result, page)
     failures = [failure for gate in gates if (failure := gate.failure(result.summary)) is not None]
@@ -110,23 +108,12 @@ def _check_folder(folder: Path, *, force: bool) -> None:
 
 
 def _report(result: Run, output: str | None, context: Context, *, force: bool) -> Path:
-    from cnc_shape.report.folder import RUNS, default_folder, write_report
+    from cnc_shape.report.folder import default_folder, write_report
 
     if output is not None:
         return write_report(result, Path(output), context, force=force)
     folder = default_folder(result, context)
-    _make_parent(Path(RUNS))
     return write_report(result, folder, context, force=True)  # its name is its content's
-
-
-def _make_parent(folder: Path) -> None:
-    from cnc_shape.errors import OutputError
-
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as fault:
-        reason = (fault.strerror or str(fault)).lower()
-        raise OutputError(f"cannot make {folder}: {reason}", hint="name a folder with -o DIR") from fault
 
 
 def _print_table(result: Run, page: Path | None) -> None:

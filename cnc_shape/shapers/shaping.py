@@ -17,7 +17,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, IntArray, frozen
 from cnc_shape.kernels.taps import delayed_sum
 from cnc_shape.shapers.shaper import NONE, Shaper
-from cnc_shape.trajectory import Trajectory
+from cnc_shape.trajectory import Trajectory, join_trajectories
 
 GRID_TOLERANCE = 1e-9  # -, of a sample: an impulse this close to the grid lies on it
 
@@ -32,16 +32,6 @@ class Delays:
     impulses: IntArray  # (d,) impulses of each axis
     common: float  # s, D: how late the shaped command is
     longest: float  # s, delay of the very last impulse
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ShapingState:
-    """The samples that later ones still hark back to."""
-
-    position: FloatArray  # (h,d)
-    velocity: FloatArray  # (h,d)
-    acceleration: FloatArray  # (h,d)
-    arc_length: FloatArray  # (h,)
 
 
 def common_delay(shapers: Mapping[str, Shaper]) -> float:
@@ -72,46 +62,35 @@ def delays(shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: fl
 
 def shaping(
     shapers: Mapping[str, Shaper], sample_time: float
-) -> Callable[[ShapingState | None, Trajectory, bool], tuple[ShapingState | None, Trajectory]]:
+) -> Callable[[Trajectory | None, Trajectory, bool], tuple[Trajectory | None, Trajectory]]:
     """Return the resumable stage that shapes the axis commands.
 
     Before its first sample the command rests there; after its last it rests there for as long as the
-    last impulse needs.
+    last impulse needs. Between two chunks the stage keeps the samples that later ones still hark back to.
     """
 
     def step(
-        state: ShapingState | None, command: Trajectory, last: bool
-    ) -> tuple[ShapingState | None, Trajectory]:
+        history: Trajectory | None, command: Trajectory, last: bool
+    ) -> tuple[Trajectory | None, Trajectory]:
         placed = delays(shapers, command.axes, sample_time)
-        history = int(placed.whole.max(initial=0)) + 2
-        if state is None:
+        kept = int(placed.whole.max(initial=0)) + 2
+        if history is None:
             if len(command) == 0:
                 return None, command
-            state = _rest(command.position[0], command.arc_length[0], history)
-        parts = [state, command]
+            history = _resting(command, 0, kept)
+        first = len(history)
+        whole = join_trajectories([history, command])
         if last:
-            end = command if len(command) else state
             after = ceil(placed.longest / sample_time - GRID_TOLERANCE)
-            parts.append(_rest(end.position[-1], end.arc_length[-1], after))
-        position = np.concatenate([part.position for part in parts])
-        velocity = np.concatenate([part.velocity for part in parts])
-        acceleration = np.concatenate([part.acceleration for part in parts])
-        arc_length = np.concatenate([part.arc_length for part in parts])
-        first = state.position.shape[0]
-        count = position.shape[0] - first
+            whole = join_trajectories([whole, _resting(whole, -1, after)])
         shaped = delayed_sum(
-            position, velocity, acceleration, first, count,
+            whole.position, whole.velocity, whole.acceleration, first, len(whole) - first,
             placed.whole, placed.share, placed.amplitude, placed.impulses, sample_time,
         )  # fmt: skip
-        kept = slice(position.shape[0] - history, None)
+        place = _late(whole.arc_length, first, placed.common / sample_time)
         return (
-            ShapingState(position[kept], velocity[kept], acceleration[kept], arc_length[kept]),
-            Trajectory(
-                command.axes,
-                sample_time,
-                frozen(_late(arc_length, first, placed.common / sample_time)),
-                *(frozen(signal) for signal in shaped),
-            ),
+            whole.cut(slice(len(whole) - kept, None)),
+            Trajectory(command.axes, sample_time, frozen(place), *(frozen(signal) for signal in shaped)),
         )
 
     return step
@@ -135,9 +114,18 @@ def shape(command: Trajectory, shapers: Mapping[str, Shaper]) -> Trajectory:
     return shaping(shapers, command.sample_time)(None, command, True)[1]
 
 
-def _rest(position: FloatArray, arc_length: float, samples: int) -> ShapingState:
-    still = np.zeros((samples, position.size))
-    return ShapingState(still + position, still, still, np.full(samples, arc_length))
+def _resting(command: Trajectory, row: int, samples: int) -> Trajectory:
+    """A command that rests for `samples` where `command` is at `row`."""
+    position = command.position[row]
+    still = frozen(np.zeros((samples, position.size)))
+    return Trajectory(
+        command.axes,
+        command.sample_time,
+        frozen(np.full(samples, command.arc_length[row])),
+        frozen(still + position),
+        still,
+        still,
+    )
 
 
 def _late(values: FloatArray, first: int, delay: float) -> FloatArray:
