@@ -9,18 +9,23 @@ import numpy as np
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import Program, concatenate
-from cnc_shape.readers import read_program
+from cnc_shape.readers import ReadingOptions, read_program
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import Source
+from cnc_shape.readers.source import ReadingLimits, Source
 
 DEFAULT = GcodeOptions()
 COLUMNS = [name for name in Program.__slots__ if name not in ("source", "axes", "notes")]
 
 
+def from_memory(text: str | bytes, limits: ReadingLimits = DEFAULT.limits, name: str = "part.nc") -> Source:
+    """Text as a source."""
+    data = text.encode() if isinstance(text, str) else text
+    return Source(name, io.BytesIO(data), limits, len(data))
+
+
 def chunks(text: str | bytes, options: GcodeOptions = DEFAULT, name: str = "part.nc") -> list[Program]:
     """Read G-code from memory, as chunks."""
-    data = text.encode() if isinstance(text, str) else text
-    source = Source(name, io.BytesIO(data), options.limits)
+    source = from_memory(text, options.limits, name)
     return list(interpret(source, survey(source, options.dialect), options))
 
 
@@ -37,10 +42,10 @@ def attempt(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program | Pro
         return error
 
 
-def attempt_file(path: Path) -> Program | ProgramError:
+def attempt_file(path: Path, options: GcodeOptions = DEFAULT) -> Program | ProgramError:
     """Read a file; a refusal is an answer too."""
     try:
-        return read_program(path)
+        return read_program(path, ReadingOptions(gcode=options))
     except ProgramError as error:
         return error
 

@@ -40,6 +40,7 @@ class Source:
     name: str
     stream: BinaryIO
     limits: ReadingLimits
+    size: int  # bytes
 
 
 @contextmanager
@@ -57,7 +58,7 @@ def open_source(path: str | Path, limits: ReadingLimits) -> Generator[Source]:
     try:
         with _faults(name):
             stream = _seekable(name, handle, limits)
-        yield Source(name, stream, limits)
+        yield Source(name, stream, limits, stream.seek(0, io.SEEK_END))
     finally:
         if handle is not sys.stdin.buffer:
             handle.close()
@@ -133,24 +134,30 @@ def lines(source: Source) -> Iterator[tuple[int, str]]:
     """
     number = 0
     for block in blocks(source):
-        harmless = b"\0" not in block and block.isascii()
         for line in block.removesuffix(b"\n").split(b"\n"):
             number += 1
-            if len(line) > source.limits.line_bytes:
-                raise ProgramError(
-                    source.name,
-                    number,
-                    source.limits.line_bytes + 1,
-                    f"the line is longer than the limit of {source.limits.line_bytes} bytes",
-                    hint="raise the limit of the line length, if this is a program at all",
-                )
-            if not harmless and b"\0" in line:
-                column = len(line[: line.index(b"\0")].decode("utf-8", "replace")) + 1
-                raise ProgramError(
-                    source.name,
-                    number,
-                    column,
-                    "NUL byte in the text",
-                    hint="this is a binary or damaged file",
-                )
-            yield number, line.decode("ascii" if harmless else "utf-8", "replace")
+            yield number, text_of(source.name, number, line, source.limits)
+
+
+def text_of(name: str, number: int, line: bytes, limits: ReadingLimits) -> str:
+    """Return line `number` of the text called `name`, without its line end, as text.
+
+    Raises
+    ------
+    ProgramError
+        At a NUL byte, and where the line is longer than ``limits.line_bytes``.
+    """
+    if len(line) > limits.line_bytes:
+        raise ProgramError(
+            name,
+            number,
+            limits.line_bytes + 1,
+            f"the line is longer than the limit of {limits.line_bytes} bytes",
+            hint="raise the limit of the line length, if this is a program at all",
+        )
+    if b"\0" in line:
+        column = len(line[: line.index(b"\0")].decode("utf-8", "replace")) + 1
+        raise ProgramError(
+            name, number, column, "NUL byte in the text", hint="this is a binary or damaged file"
+        )
+    return line.decode("utf-8", "replace")
