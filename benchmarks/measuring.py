@@ -22,6 +22,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("CNC_SHAPE_SHARED", ROOT.parent / "shared"))
+NOT_BUILT = "not built yet"
 CNC_SHAPE = (sys.executable, "-m", "cnc_shape")
 
 
@@ -67,7 +68,8 @@ class Row:
 
     def cells(self) -> tuple[str, str, str, str, str, str]:
         """Stage, ours, peer, ratio, budget and verdict, to be read."""
-        ours = "not measured" if self.ours is None else quantity(self.ours, self.unit)
+        missing = NOT_BUILT if self.note == NOT_BUILT else "not measured"
+        ours = missing if self.ours is None else quantity(self.ours, self.unit)
         told = None if self.peer is None else quantity(self.peer, self.unit)
         peer = ": ".join(part for part in (self.peer_name, told) if part) or "–"
         ratio = "–" if self.value is None or self.kind is Kind.LIMIT else quantity(self.value, "×")
@@ -98,7 +100,7 @@ def parse(line: str) -> Row | None:
 
 def not_built(stage: str, kind: Kind, budget: float, peer_name: str) -> Row:
     """Keep the place of a stage that does not exist yet."""
-    return Row(stage, kind, budget, peer_name, note="not built yet")
+    return Row(stage, kind, budget, peer_name, note=NOT_BUILT)
 
 
 def report(rows: Iterable[Row]) -> None:

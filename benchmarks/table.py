@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from benchmarks.measuring import Row, machine_lines, parse
+from benchmarks.measuring import NOT_BUILT, Row, machine_lines, parse
 
 SCRIPTS = (
     "reading",
@@ -66,7 +66,8 @@ def table(rows: Iterable[Row]) -> str:
 
 def notes(rows: Iterable[Row]) -> str:
     """Return what rows have to say beside their numbers, as a list."""
-    return "\n".join(f"- {row.stage} ({row.peer_name or row.unit}): {row.note}" for row in rows if row.note)
+    told = [row for row in rows if row.note and row.note != NOT_BUILT]
+    return "\n".join(f"- {row.stage}, {row.peer_name or row.unit}: {row.note}" for row in told)
 
 
 def placed(text: str, produced: str) -> str:

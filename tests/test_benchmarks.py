@@ -126,6 +126,12 @@ def test_the_table_has_a_line_a_row_and_equal_columns():
     assert {line.count("|") for line in lines} == {len(table.HEADINGS) + 1}
 
 
+def test_what_is_not_built_stands_in_the_table_and_not_in_the_notes():
+    rows = [not_built("observer", Kind.SHARE, 2.0, "peer"), ROWS["share, kept"][0]]
+    assert "not built yet" in table.table(rows)
+    assert table.notes(rows) == "- s, peer: note"
+
+
 def test_the_table_goes_between_its_markers_and_replaces_the_last_one():
     text = f"before {table.BEGIN} old {table.END} after"
     once = table.placed(text, "new")
@@ -133,7 +139,16 @@ def test_the_table_goes_between_its_markers_and_replaces_the_last_one():
     assert table.placed(once, "new") == once
 
 
-@pytest.mark.parametrize("text", ["", table.BEGIN, table.END + table.BEGIN, 2 * (table.BEGIN + table.END)])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        table.BEGIN,
+        table.END + table.BEGIN,
+        2 * table.BEGIN + table.END,
+        table.BEGIN + 2 * table.END,
+    ],
+)
 def test_a_document_without_its_markers_is_refused(text):
     with pytest.raises(ValueError, match="once each"):
         table.placed(text, "new")
