@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -95,7 +95,7 @@ def parse(line: str) -> Row | None:
     if not line.startswith('{"stage"'):
         return None
     values = json.loads(line)
-    return Row(**{**values, "kind": Kind(values["kind"])})
+    return Row(kind=Kind(values.pop("kind")), **values)
 
 
 def not_built(stage: str, kind: Kind, budget: float, peer_name: str) -> Row:
@@ -217,7 +217,7 @@ def best_child(
 
 
 @contextmanager
-def workshop() -> Iterator[Path]:
+def workshop() -> Generator[Path]:
     """Lend a folder that is gone afterwards."""
     with tempfile.TemporaryDirectory(prefix="cnc-shape-benchmark-") as name:
         yield Path(name)
