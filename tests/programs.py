@@ -11,33 +11,52 @@ from cnc_shape.errors import ProgramError
 from cnc_shape.program import Program, concatenate
 from cnc_shape.readers import ReadingOptions, read_program
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import ReadingLimits, Source
+from cnc_shape.readers.source import CHUNK_ROWS, ReadingLimits, Source
 
 DEFAULT = GcodeOptions()
+LIMITS = ReadingLimits()
 COLUMNS = [name for name in Program.__slots__ if name not in ("source", "axes", "notes")]
 
 
-def from_memory(text: str | bytes, limits: ReadingLimits = DEFAULT.limits, name: str = "part.nc") -> Source:
+def from_memory(text: str | bytes, limits: ReadingLimits = LIMITS, name: str = "part.nc") -> Source:
     """Text as a source."""
     data = text.encode() if isinstance(text, str) else text
     return Source(name, io.BytesIO(data), limits, len(data))
 
 
-def chunks(text: str | bytes, options: GcodeOptions = DEFAULT, name: str = "part.nc") -> list[Program]:
+def chunks(
+    text: str | bytes,
+    options: GcodeOptions = DEFAULT,
+    *,
+    rows: int = CHUNK_ROWS,
+    limits: ReadingLimits = LIMITS,
+) -> list[Program]:
     """Read G-code from memory, as chunks."""
-    source = from_memory(text, options.limits, name)
-    return list(interpret(source, survey(source, options.dialect), options))
+    source = from_memory(text, limits)
+    return list(interpret(source, survey(source, options.dialect), options, rows))
 
 
-def read(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program:
+def read(
+    text: str | bytes,
+    options: GcodeOptions = DEFAULT,
+    *,
+    rows: int = CHUNK_ROWS,
+    limits: ReadingLimits = LIMITS,
+) -> Program:
     """Read G-code from memory."""
-    return concatenate(chunks(text, options))
+    return concatenate(chunks(text, options, rows=rows, limits=limits))
 
 
-def attempt(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program | ProgramError:
+def attempt(
+    text: str | bytes,
+    options: GcodeOptions = DEFAULT,
+    *,
+    rows: int = CHUNK_ROWS,
+    limits: ReadingLimits = LIMITS,
+) -> Program | ProgramError:
     """Read G-code from memory; a refusal is an answer too."""
     try:
-        return read(text, options)
+        return read(text, options, rows=rows, limits=limits)
     except ProgramError as error:
         return error
 

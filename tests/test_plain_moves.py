@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import assert_same, attempt, attempt_file, chunks, read
+from programs import DEFAULT, LIMITS, assert_same, attempt, attempt_file, chunks, read
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import concatenate
 from cnc_shape.readers import source
 from cnc_shape.readers.gcode import Dialect, GcodeOptions, interpreter
 from cnc_shape.readers.gcode.plain import PAYS_FROM
-from cnc_shape.readers.source import ReadingLimits
+from cnc_shape.readers.source import CHUNK_ROWS, ReadingLimits
 
 ALWAYS, NEVER = 0, 1 << 60  # compiled from a length that every text has, or none
 
@@ -28,10 +29,10 @@ def assert_equal_answers(one, other):
         assert one.notes == other.notes
 
 
-def assert_two_ways_agree(text, **options):
+def assert_two_ways_agree(text, options=DEFAULT, rows=CHUNK_ROWS, limits=LIMITS):
+    compiled, readable = (replace(options, compiled_from=length) for length in (ALWAYS, NEVER))
     assert_equal_answers(
-        attempt(text, GcodeOptions(compiled_from=ALWAYS, **options)),
-        attempt(text, GcodeOptions(compiled_from=NEVER, **options)),
+        attempt(text, compiled, rows=rows, limits=limits), attempt(text, readable, rows=rows, limits=limits)
     )
 
 
@@ -62,7 +63,7 @@ PROGRAMS = st.lists(LINES, max_size=25).map(lambda lines: "\n".join(["G1 F100 X0
 @given(PROGRAMS, st.sampled_from(list(Dialect)), st.sampled_from([1, 2, 5, 100]), st.booleans())
 @settings(max_examples=1000)
 def test_random_programs(text, dialect, rows, block_delete):
-    assert_two_ways_agree(text, dialect=dialect, rows=rows, block_delete=block_delete)
+    assert_two_ways_agree(text, GcodeOptions(dialect=dialect, block_delete=block_delete), rows=rows)
 
 
 @pytest.mark.parametrize("dialect", list(Dialect))
@@ -70,21 +71,21 @@ def test_every_kind_of_line_between_plain_ones(dialect):
     for line in [*MODES, *OTHERS]:
         for before in ("", "G0", "G91", "G93", "G2 X1 I2", "G20", "G92 X1 A3", "G80"):
             text = f"G1 F100 X0\nX1\n{before}\n{line}\nY2\nG1 X3 F7\nA2 F8\n"
-            assert_two_ways_agree(text, dialect=dialect)
+            assert_two_ways_agree(text, GcodeOptions(dialect=dialect))
 
 
 @given(st.binary(max_size=60) | st.text(alphabet="GXYFNS01.-+ ()%;\n\t", max_size=120).map(str.encode))
 @settings(max_examples=500)
 def test_any_bytes(data):
     for dialect in Dialect:
-        assert_two_ways_agree(b"G1F9X0\n" + data, dialect=dialect)
+        assert_two_ways_agree(b"G1F9X0\n" + data, GcodeOptions(dialect=dialect))
 
 
 @given(PROGRAMS, st.integers(1, 12), st.integers(1, 40))
 @settings(max_examples=200)
 def test_limits_are_hit_at_the_same_line(text, blocks, line_bytes):
     limits = ReadingLimits(blocks=blocks, line_bytes=line_bytes, coordinate=100.0)
-    assert_two_ways_agree(text, limits=limits, dialect=Dialect.RS274)
+    assert_two_ways_agree(text, GcodeOptions(dialect=Dialect.RS274), limits=limits)
 
 
 def test_pieces_of_any_size(monkeypatch):
@@ -100,7 +101,7 @@ def test_pieces_of_any_size(monkeypatch):
 def test_chunks_of_any_size(rows):
     count = 300 if rows < 100 else 40_000
     program = "F100 G0 X0\n" + "".join(f"G1 X{k * 0.37:.3f} Y{k % 7}\n" for k in range(count))
-    parts = chunks(program, GcodeOptions(rows=rows, compiled_from=ALWAYS))
+    parts = chunks(program, GcodeOptions(compiled_from=ALWAYS), rows=rows)
     assert all(len(part) == rows for part in parts[:-1])
     assert_same(concatenate(parts), read(program, GcodeOptions(compiled_from=NEVER)))
 

@@ -338,7 +338,7 @@ def test_what_is_refused_and_where(text, column, reason):
 )
 def test_limits_are_named_when_hit(limits, text, reason):
     with pytest.raises(ProgramError, match=reason):
-        read(text, GcodeOptions(limits=limits))
+        read(text, limits=limits)
 
 
 # dialects
@@ -440,13 +440,13 @@ LONG = LONG.replace("G3 X3 I.5 J.2", "G3 X3 Y1 I.5")
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 1000])
 def test_chunks_of_any_size_hold_the_same_bits(rows):
-    whole = read(LONG, GcodeOptions(rows=10**9))
-    parts = chunks(LONG, GcodeOptions(rows=rows))
+    whole = read(LONG, rows=10**9)
+    parts = chunks(LONG, rows=rows)
     assert len(parts) > 1 or rows == 1000
     assert all(len(part) == rows for part in parts[:-1])
     for before, after in pairwise(parts):
         np.testing.assert_array_equal(before.end, after.start)
-    assert_same(read(LONG, GcodeOptions(rows=rows)), whole)
+    assert_same(read(LONG, rows=rows), whole)
 
 
 ANY_TEXT = st.text(alphabet="GMXYZABCIJKRPQFSTNOHE0123456789.-+ ()%;/#[]\n\t$*=", max_size=120)

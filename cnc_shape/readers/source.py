@@ -13,6 +13,7 @@ from typing import BinaryIO
 from cnc_shape.errors import ProgramError
 
 BLOCK_BYTES = 1 << 20  # read at once
+CHUNK_ROWS = 8192  # moves that are handed on together
 STANDARD_INPUT = "-"
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 UTF8_MARK = b"\xef\xbb\xbf"

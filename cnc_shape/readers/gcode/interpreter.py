@@ -8,7 +8,7 @@ many at once, from the bytes; every other line takes the readable way through `r
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from cnc_shape.readers.gcode.motion import ARCS, dwell, move
 from cnc_shape.readers.gcode.plain import PAYS_FROM, Bytes, as_bytes, take_plain_moves
 from cnc_shape.readers.gcode.rows import Rows, to_program
 from cnc_shape.readers.gcode.settings import apply_after, apply_before
-from cnc_shape.readers.source import ReadingLimits, Source, blocks, text_of
+from cnc_shape.readers.source import CHUNK_ROWS, Source, blocks, text_of
 from cnc_shape.tools import Tool
 
 _LEFT_OVER = frozenset("NFSTO")
@@ -37,16 +37,15 @@ class GcodeOptions:
     dialect: Dialect | None = None  # None: decided on evidence
     block_delete: bool = False  # lines that start with / are skipped
     tools: tuple[Tool, ...] = ()
-    rows: int = 16384  # of a chunk
     compiled_from: int = PAYS_FROM  # bytes: in longer texts, plain lines take the compiled way
-    limits: ReadingLimits = field(default_factory=ReadingLimits)
 
 
 class Interpreter:
     """A program being read: the modal state, and the rows that were not handed on yet."""
 
-    def __init__(self, source: str, survey: Survey, options: GcodeOptions) -> None:
-        self.source = source
+    def __init__(self, source: Source, survey: Survey, options: GcodeOptions) -> None:
+        self.source = source.name
+        self.limits = source.limits
         self.survey = survey
         self.dialect = survey.dialect
         self.options = options
@@ -71,12 +70,12 @@ class Interpreter:
         self.rows, self.start = Rows(), chunk.end
         return chunk
 
-    def take_plain_lines(self, text: Bytes, at: int) -> int:
+    def take_plain_lines(self, text: Bytes, at: int, rows: int) -> int:
         """Carry out plain lines of `text` from `at` on in the compiled way; return where it stopped."""
-        limits = self.options.limits
+        limits = self.limits
         taken = take_plain_moves(
             text, at, self.line, self.modal, self.rows, self.dialect,
-            most_rows=self.options.rows, blocks=limits.blocks - self.blocks, limits=limits,
+            most_rows=rows, blocks=limits.blocks - self.blocks, limits=limits,
         )  # fmt: skip
         self.line += taken.lines
         self.blocks += taken.blocks
@@ -91,7 +90,7 @@ class Interpreter:
             With the line and the column.
         """
         self.line += 1
-        text = text_of(self.source, self.line, line, self.options.limits)
+        text = text_of(self.source, self.line, line, self.limits)
         try:
             self.execute(text)
         except BlockError as error:
@@ -131,9 +130,9 @@ class Interpreter:
     def count(self) -> None:
         """Count an executed block, up to the limit."""
         self.blocks += 1
-        if self.blocks > self.options.limits.blocks:
+        if self.blocks > self.limits.blocks:
             raise BlockError(
-                f"more blocks were executed than the limit of {self.options.limits.blocks}",
+                f"more blocks were executed than the limit of {self.limits.blocks}",
                 hint="raise the limit of the executed blocks, or split the program",
                 column=1,
             )
@@ -183,7 +182,7 @@ class Interpreter:
             words.pop("E", None)
             self.remark("G187", "G187 is ignored: the path tolerance is the machine's")
         apply_after(block, modal, self.tools, self.remark)
-        move(block, self.line, modal, self.rows, self.dialect, self.options.limits)
+        move(block, self.line, modal, self.rows, self.dialect, self.limits)
         left = set(words) - _LEFT_OVER
         if self.dialect is Dialect.MARLIN:
             left -= {"E"}
@@ -235,30 +234,32 @@ def _one_owner(block: Block, modal: Modal) -> None:
         raise BlockError("two codes use the P of this line", hint="write two lines", letter="P")
 
 
-def interpret(source: Source, survey: Survey, options: GcodeOptions) -> Iterator[Program]:
-    """Yield the program in chunks of at least ``options.rows`` rows; the last holds the rest.
+def interpret(
+    source: Source, survey: Survey, options: GcodeOptions, rows: int = CHUNK_ROWS
+) -> Iterator[Program]:
+    """Yield the program in chunks of at least `rows` rows; the last holds the rest.
 
     Raises
     ------
     ProgramError
         At the first thing that is wrong, with its line and column.
     """
-    machine = Interpreter(source.name, survey, options)
+    machine = Interpreter(source, survey, options)
     compiled = source.size >= options.compiled_from
     for block in blocks(source):
         text = as_bytes(block)
         at = 0
         while at < len(block):
             if compiled:
-                at = machine.take_plain_lines(text, at)
-            if at < len(block) and len(machine.rows) < options.rows:
+                at = machine.take_plain_lines(text, at, rows)
+            if at < len(block) and len(machine.rows) < rows:
                 end = block.find(b"\n", at)
                 end = end if end >= 0 else len(block)
                 machine.take_line(block[at:end])
                 at = end + 1
             if machine.ended:
                 break
-            if len(machine.rows) >= options.rows:
+            if len(machine.rows) >= rows:
                 yield machine.hand_on()
         if machine.ended:
             break

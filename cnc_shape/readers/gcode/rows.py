@@ -11,6 +11,7 @@ import numpy as np
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.program import ROTARY, XYZ, Motion, Note, Program
 from cnc_shape.readers.gcode.modal import AXES, Modal
+from cnc_shape.readers.source import CHUNK_ROWS
 from cnc_shape.toolpath import rotary_travel, travel_lengths
 from cnc_shape.units import DEGREE
 
@@ -55,14 +56,11 @@ def _columns(rows: int) -> Columns:
     )  # fmt: skip
 
 
-_FIRST_ROWS = 16_384  # room to begin with
-
-
 @dataclass(slots=True)
 class Rows:
     """The moves since the last chunk was handed on. Arcs are few: their geometry stands aside."""
 
-    columns: Columns = field(default_factory=lambda: _columns(_FIRST_ROWS))
+    columns: Columns = field(default_factory=lambda: _columns(CHUNK_ROWS))
     count: int = 0
     arcs: list[tuple[int, tuple[float, float, float], tuple[float, float, float], float]] = field(
         default_factory=list[tuple[int, tuple[float, float, float], tuple[float, float, float], float]]
