@@ -15,8 +15,7 @@ from cnc_shape.errors import ProgramError
 from cnc_shape.program import concatenate
 from cnc_shape.readers import source
 from cnc_shape.readers.gcode import Dialect, GcodeOptions, interpreter
-from cnc_shape.readers.gcode.plain import PAYS_FROM
-from cnc_shape.readers.source import CHUNK_ROWS, ReadingLimits
+from cnc_shape.readers.source import CHUNK_ROWS, COMPILED_FROM, ReadingLimits
 
 ALWAYS, NEVER = 0, 1 << 60  # compiled from a length that every text has, or none
 
@@ -126,8 +125,8 @@ def test_long_programs_take_the_compiled_way_by_themselves(monkeypatch):
     line = "G1 F100 X1\n"
     read(line)
     assert not taken
-    read(line * (PAYS_FROM // len(line) + 1))
-    assert taken[0] == PAYS_FROM // len(line) + 1
+    read(line * (COMPILED_FROM // len(line) + 1))
+    assert taken[0] == COMPILED_FROM // len(line) + 1
 
 
 def test_every_reference_program_probe_and_hostile_input(shared):

@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 from cnc_shape.errors import OptionError, ProgramError
 from cnc_shape.program import Program, concatenate
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import CHUNK_ROWS, ReadingLimits, Source, lines, open_source
+from cnc_shape.readers.source import (
+    CHUNK_ROWS,
+    ReadingLimits,
+    Source,
+    blocks,
+    count_lines,
+    lines,
+    open_source,
+)
 from cnc_shape.readers.table import TIME, is_table, read_header
 from cnc_shape.readers.timed import TimedPoints, read_timed_points, timed_program
 from cnc_shape.readers.waypoints import read_waypoints
@@ -71,9 +79,9 @@ def table_reading(source: Source, options: ReadingOptions) -> Reading:
     if options.curve is not Curve.POLYLINE:
         raise OptionError(f"--path {options.curve.value} is not built yet", hint="take --path polyline")
     header = read_header(source)
-    count = sum(1 for _ in lines(source))
+    count = sum(count_lines(block) for block in blocks(source))
     if TIME in header.names:
-        points = read_timed_points(source, header)
+        points = read_timed_points(source, header, rows=options.rows)
         return Reading(source.name, CSV, count, header.axes, iter([timed_program(points)]), points)
     chunks = read_waypoints(source, header, closed=options.closed, rows=options.rows)
     return Reading(source.name, CSV, count, header.axes, chunks)

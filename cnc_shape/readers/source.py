@@ -8,15 +8,21 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cnc_shape.errors import ProgramError
 
 BLOCK_BYTES = 1 << 20  # read at once
 CHUNK_ROWS = 8192  # moves that are handed on together
+COMPILED_FROM = 1 << 16  # bytes: reading a shorter text takes less time than loading compiled code
 STANDARD_INPUT = "-"
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 UTF8_MARK = b"\xef\xbb\xbf"
+
+Bytes: TypeAlias = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +129,22 @@ def blocks(source: Source) -> Iterator[bytes]:
             rest += tail
     if rest:
         yield rest
+
+
+def as_bytes(text: bytes) -> Bytes:
+    """View text as an array."""
+    return np.frombuffer(text, dtype=np.uint8)
+
+
+def line_at(block: bytes, at: int) -> bytes:
+    """Return the line that begins at `at`, without its end."""
+    end = block.find(b"\n", at)
+    return block[at : end if end >= 0 else len(block)]
+
+
+def count_lines(block: bytes) -> int:
+    """Count the lines of a block: the last may lack its end."""
+    return block.count(b"\n") + (not block.endswith(b"\n"))
 
 
 def lines(source: Source) -> Iterator[tuple[int, str]]:

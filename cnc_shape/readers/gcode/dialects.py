@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from cnc_shape.program import ROTARY, XYZ
-from cnc_shape.readers.source import Source, blocks
+from cnc_shape.readers.source import Source, blocks, count_lines
 
 
 class Dialect(Enum):
@@ -63,7 +63,7 @@ def survey(source: Source, dialect: Dialect | None) -> Survey:
     words_seen, moves_seen = set[str](), set[str]()
     for block in blocks(source):
         head = head or block[: 1 << 16]
-        count += block.count(b"\n") + (not block.endswith(b"\n"))
+        count += count_lines(block)
         words = _COMMENT.sub(b" ", block) if b"(" in block or b";" in block else block
         words = words.upper()
         # a search for one byte is far quicker than one for a pattern, and most answers are no

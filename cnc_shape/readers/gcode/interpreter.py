@@ -21,10 +21,19 @@ from cnc_shape.readers.gcode.dialects import Dialect, Survey
 from cnc_shape.readers.gcode.lexer import BlockError, column_of, compact, diagnose, split_words
 from cnc_shape.readers.gcode.modal import AXES, Modal
 from cnc_shape.readers.gcode.motion import ARCS, dwell, move
-from cnc_shape.readers.gcode.plain import PAYS_FROM, Bytes, as_bytes, take_plain_moves
+from cnc_shape.readers.gcode.plain import take_plain_moves
 from cnc_shape.readers.gcode.rows import Rows, to_program
 from cnc_shape.readers.gcode.settings import apply_after, apply_before
-from cnc_shape.readers.source import CHUNK_ROWS, Source, blocks, text_of
+from cnc_shape.readers.source import (
+    CHUNK_ROWS,
+    COMPILED_FROM,
+    Bytes,
+    Source,
+    as_bytes,
+    blocks,
+    line_at,
+    text_of,
+)
 from cnc_shape.tools import Tool
 
 _LEFT_OVER = frozenset("NFSTO")
@@ -37,7 +46,7 @@ class GcodeOptions:
     dialect: Dialect | None = None  # None: decided on evidence
     block_delete: bool = False  # lines that start with / are skipped
     tools: tuple[Tool, ...] = ()
-    compiled_from: int = PAYS_FROM  # bytes: in longer texts, plain lines take the compiled way
+    compiled_from: int = COMPILED_FROM  # bytes: in longer texts, plain lines take the compiled way
 
 
 class Interpreter:
@@ -253,10 +262,9 @@ def interpret(
             if compiled:
                 at = machine.take_plain_lines(text, at, rows)
             if at < len(block) and len(machine.rows) < rows:
-                end = block.find(b"\n", at)
-                end = end if end >= 0 else len(block)
-                machine.take_line(block[at:end])
-                at = end + 1
+                line = line_at(block, at)
+                machine.take_line(line)
+                at += len(line) + 1
             if machine.ended:
                 break
             if len(machine.rows) >= rows:

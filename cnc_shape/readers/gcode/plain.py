@@ -10,7 +10,6 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cnc_shape.readers.gcode.blocks import LARGEST
 from cnc_shape.readers.gcode.codes import FEED, INVERSE_TIME, PER_REVOLUTION, RAPID
@@ -18,11 +17,9 @@ from cnc_shape.readers.gcode.dialects import Dialect
 from cnc_shape.readers.gcode.modal import AXES, Modal
 from cnc_shape.readers.gcode.rows import Rows
 from cnc_shape.readers.gcode.settings import SLOWEST
-from cnc_shape.readers.source import ReadingLimits
+from cnc_shape.readers.source import Bytes, ReadingLimits
 from cnc_shape.units import PER_MIN
 
-Bytes = NDArray[np.uint8]
-PAYS_FROM = 1 << 16  # bytes: reading a shorter text takes less time than loading compiled code
 _WORDS = AXES + "GFSEN"  # in the kernel's order
 
 
@@ -49,11 +46,6 @@ class Taken(NamedTuple):
     at: int  # first byte of the line that was not taken
     lines: int
     blocks: int  # lines with words
-
-
-def as_bytes(text: bytes) -> Bytes:
-    """View text as an array."""
-    return np.frombuffer(text, dtype=np.uint8)
 
 
 @cache
