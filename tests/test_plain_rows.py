@@ -69,6 +69,11 @@ def test_limits_are_hit_at_the_same_line(text, line_bytes):
     assert_two_ways_agree("x_mm,y_mm\n" + text, limits=ReadingLimits(line_bytes=line_bytes, coordinate=50.0))
 
 
+@pytest.mark.parametrize("line", [" " * 20, "1.00000000000000,2.0"])
+def test_a_line_can_be_too_long(line):
+    assert_two_ways_agree("x_mm,y_mm\n1,2\n" + line + "\n3,4", limits=ReadingLimits(line_bytes=15))
+
+
 def test_pieces_of_any_size(monkeypatch):
     text = "x_mm,y_mm\n1,2\n\n 3.5 , 4e1\n5,6"
     for end in ("\n", "\r\n", "\r"):

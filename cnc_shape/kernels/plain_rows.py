@@ -15,7 +15,7 @@ def skip_blanks(text, at):
 
 @kernel
 def plain_rows(text, at, line, line_bytes, scales, bounds, table, lines, count):
-    """Take lines of `text` (n,) bytes from `at` on, as long as they are plain rows or blank, and there is room.
+    """Take lines of `text` (n,) bytes from `at` on, as long as they are plain or blank and there is room.
 
     A row has one number for each of the columns; times `scales` (c,) it lies within +-`bounds` (c,). Rows go
     to `table` (r,c) and their lines to `lines` (r,) from `count` on; `line` lines came before.
