@@ -9,17 +9,17 @@ from contextlib import contextmanager
 Advance = Callable[[float], None]
 
 
-def announce_compilation(*, quiet: bool) -> None:
-    """Say so when the kernels have to be compiled first: it happens once, and takes its time."""
-    from cnc_shape.kernels import compiled_before
-
-    if not quiet and not compiled_before():
-        sys.stderr.write("compiling the numerical kernels for this processor, once: some twenty seconds\n")
+def _say_that_kernels_compile() -> None:
+    sys.stderr.write(
+        "compiling the numerical kernels for this processor, once; cnc-shape doctor --warm does it ahead\n"
+    )
 
 
 @contextmanager
 def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advance]:
     """Show a bar for `what`; the body calls the value with how much of `total` it has just done.
+
+    Where the body has to compile kernels, which happens once and takes its time, one line says so.
 
     Parameters
     ----------
@@ -28,9 +28,20 @@ def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advanc
     total
         How much there is to do, in any unit, or None where that is not known.
     quiet
-        Show nothing (``--quiet``, ``--json``). Nothing is shown either unless stderr is a terminal.
+        Show and say nothing (``--quiet``, ``--json``). No bar is shown either unless stderr is a terminal.
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet:
+        yield lambda amount: None
+        return
+    from cnc_shape.kernels import compilation_told
+
+    with compilation_told(_say_that_kernels_compile), _bar(what, total) as advance:
+        yield advance
+
+
+@contextmanager
+def _bar(what: str, total: float | None) -> Generator[Advance]:
+    if not sys.stderr.isatty():
         yield lambda amount: None
         return
     from rich.console import Console
