@@ -48,7 +48,6 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
-    from cnc_shape.api import report_context
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
     from cnc_shape.cli.output import print_error, print_json, warn
@@ -75,6 +74,8 @@ def simulate(
         result = run(motion.blocks, setup, picked, motion.name, record=wanted)
     page = None
     if wanted:
+        from cnc_shape.api import report_context
+
         command = ["simulate", motion.name, *(["--cases", cases] if cases else [])]
         context = report_context([source], setup, command, motion.warnings(by_name=True), kind)
         page = _report(result, output, context, force=force)
