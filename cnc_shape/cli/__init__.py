@@ -22,12 +22,13 @@ from cnc_shape import __version__
 from cnc_shape.cli.apply import apply
 from cnc_shape.cli.check import check
 from cnc_shape.cli.design import design
+from cnc_shape.cli.doctor import doctor
 from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
 from cnc_shape.cli.init import init
 from cnc_shape.cli.output import print_text
 from cnc_shape.cli.simulate import simulate
 
-COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init)
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init, doctor)
 
 GARBAGE_THRESHOLD: Final = 20_000  # objects made before the first generation is searched
 

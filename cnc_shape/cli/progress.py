@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
+from cnc_shape.cli.output import print_error
+
 Advance = Callable[[float], None]
 
 
-def _say_that_kernels_compile() -> None:
-    sys.stderr.write(
-        "compiling the numerical kernels for this processor, once; cnc-shape doctor --warm does it ahead\n"
-    )
+class _Told(logging.Handler):
+    """What the kernels log, on stderr."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print_error(record.getMessage())
 
 
 @contextmanager
@@ -33,10 +37,16 @@ def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advanc
     if quiet:
         yield lambda amount: None
         return
-    from cnc_shape.kernels import compilation_told
-
-    with compilation_told(_say_that_kernels_compile), _bar(what, total) as advance:
-        yield advance
+    kernels, told = logging.getLogger("cnc_shape.kernels"), _Told()
+    level = kernels.level
+    kernels.addHandler(told)
+    kernels.setLevel(logging.INFO)
+    try:
+        with _bar(what, total) as advance:
+            yield advance
+    finally:
+        kernels.setLevel(level)
+        kernels.removeHandler(told)
 
 
 @contextmanager

@@ -11,12 +11,13 @@ upgrade names a new folder, nothing goes stale, and installs may be read-only.
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -27,7 +28,8 @@ from numba.core import config, event
 
 _PACKAGE: Final = Path(__file__).resolve().parent.parent
 _MARK: Final = re.compile(rb"^@kernel\b", re.MULTILINE)
-_FOLDER_NAME: Final = "cnc-shape"
+FOLDER_NAME: Final = "cnc-shape"
+_LOG: Final = logging.getLogger(__name__)
 
 
 def _sources() -> Iterator[bytes]:
@@ -58,7 +60,8 @@ def _key() -> str:
     return digest.hexdigest()[:16]
 
 
-def _user_cache() -> Path:
+def user_cache() -> Path:
+    """Return the folder below which caches of this user lie, or that NUMBA_CACHE_DIR chooses."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
     if sys.platform == "win32":
@@ -77,40 +80,38 @@ def cache_folder() -> Path:
     temporary = Path(tempfile.gettempdir())
     bases = [temporary]
     with suppress(RuntimeError):  # no home folder for this user
-        bases.insert(0, _user_cache())
+        bases.insert(0, user_cache())
     key = _key()
     for base in bases:
-        folder = base / _FOLDER_NAME / key
+        folder = base / FOLDER_NAME / key
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
                 return folder
-    return Path(tempfile.mkdtemp(prefix=f"{_FOLDER_NAME}-"))
+    return Path(tempfile.mkdtemp(prefix=f"{FOLDER_NAME}-"))
 
 
-class _FirstCompilation(event.Listener):
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell = tell
+class _Compilation(event.Listener):
+    """Logs the first compilation of this process; where machine code comes from the cache there is none."""
+
+    def __init__(self) -> None:
         self._told = False
 
     def on_start(self, event: event.Event) -> None:
         if not self._told:
             self._told = True
-            self._tell()
+            _LOG.info("compiling the numerical kernels for this processor, which happens once")
 
     def on_end(self, event: event.Event) -> None:
         pass
 
 
-@contextmanager
-def compilation_told(tell: Callable[[], None]) -> Generator[None]:
-    """Call `tell` when the body first has to compile a kernel; never where all come from the cache."""
-    listener = _FirstCompilation(tell)
-    event.register("numba:compile", listener)
-    try:
-        yield
-    finally:
-        event.unregister("numba:compile", listener)
+event.register("numba:compile", _Compilation())
+
+
+def compiled_count() -> int:
+    """Return how many kernels have machine code in the cache."""
+    return sum(1 for _ in cache_folder().glob("*/*.nbi"))
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
