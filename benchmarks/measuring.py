@@ -20,6 +20,10 @@ from enum import StrEnum
 from importlib import metadata
 from pathlib import Path
 
+from cnc_shape.cli import start_quickly
+
+start_quickly()  # as the command line does, before anything heavy is imported
+
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("CNC_SHAPE_SHARED", ROOT.parent / "shared"))
 NOT_BUILT = "not built yet"

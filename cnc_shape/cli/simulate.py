@@ -52,11 +52,10 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
-    from cnc_shape.api import report_context
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
     from cnc_shape.cli.output import print_error, print_json, warn
-    from cnc_shape.cli.progress import announce_compilation, progress
+    from cnc_shape.cli.progress import progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
@@ -76,11 +75,12 @@ def simulate(
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    announce_compilation(quiet=quiet or json)
     with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
         result = run(motion.blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals)
     page = None
     if wanted:
+        from cnc_shape.api import report_context
+
         command = [
             "simulate", motion.name, *(["--cases", cases] if cases else []),
             *(["--all-signals"] if all_signals else []),
