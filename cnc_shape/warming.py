@@ -24,6 +24,7 @@ from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import default_cases, run
 from cnc_shape.readers import ReadingOptions, read_program, reading
 from cnc_shape.readers.source import COMPILED_FROM
+from cnc_shape.recording.extremes import BUCKETS
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.writers.points import points_file, points_of
@@ -52,6 +53,8 @@ M2
 """
 TABLE = "x_mm,y_mm,z_mm,feed_mm_min\n0,0,0,1200\n4,0,0,1200\n4,3,1,900\n2,3,0,900\n0,0,0,900\n"
 TIMES = "time_s,x_mm,y_mm\n0,0,0\n0.01,0.1,0\n0.03,0.4,0.1\n0.05,0.5,0.2\n"
+SAMPLES = 20 * BUCKETS  # more than a report keeps as they are
+LONG = "G21 G90\nG1 X1 F3000\nG4 P{seconds}\nX0\n"
 PROGRAMS = {"lines.nc": LINES, "curves.nc": CURVES, "table.csv": TABLE, "times.csv": TIMES}
 
 
@@ -74,6 +77,7 @@ def warm() -> Iterator[int]:
                     _apply(path, setup, options)
                     yield compiled_count()
         _certify(Path(folder) / "lines.nc", machines[0])
+        _thin(Path(folder) / "long.nc", machines[0])
         yield compiled_count()
 
 
@@ -100,6 +104,13 @@ def _apply(path: Path, setup: Setup, options: ReadingOptions) -> None:
         for _ in work.blocks():
             pass
         work.summary()
+
+
+def _thin(path: Path, setup: Setup) -> None:
+    """Record more samples than are kept as they are."""
+    path.write_text(LONG.format(seconds=SAMPLES * setup.control.sample_time))
+    with open_motion(str(path), setup) as motion:
+        run(motion.blocks, setup, default_cases(setup)[:1], motion.name, record=True)
 
 
 def _certify(path: Path, setup: Setup) -> None:
