@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cnc_shape.errors import ProgramError
 
 BLOCK_BYTES = 1 << 20  # read at once
-CHUNK_ROWS = 8192  # moves that are handed on together
+CHUNK_ROWS = 4096  # moves that are handed on together
 COMPILED_FROM = 1 << 16  # bytes: reading a shorter text takes less time than loading compiled code
 STANDARD_INPUT = "-"
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
