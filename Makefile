@@ -28,6 +28,10 @@ $(VENV)/.test: $(BIN)/python pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $@ $(VENV)/.run
 
+$(VENV)/.bench: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --editable '.[bench]'
+	@touch $@
+
 demo: $(VENV)/.run
 	$(BIN)/cnc-shape simulate --report
 
@@ -40,8 +44,8 @@ lint: $(VENV)/.test
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.test
-	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+bench: $(VENV)/.bench
+	$(BIN)/python benchmarks/table.py $(BENCH_ARGS)
 
 clean:
 	rm -rf $(VENV) cnc-shape-runs build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache

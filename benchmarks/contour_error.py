@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from paths import arc, line, toolpath
 
+from benchmarks.measuring import Kind, Row, report
 from cnc_shape.arrays import FloatArray
 from cnc_shape.contour import contour_error
 from cnc_shape.toolpath import Toolpath
@@ -91,6 +92,9 @@ def main() -> None:
                 f"  window {window:4.0f} mm            {ours / place.size * 1e9:7.0f} ns/sample"
                 f"   {ours / place.size / peer:5.2f} of the peer"
             )
+            stage, unit = f"contour error, {name}, window {window:g} mm", "ns/sample"
+            ours_each, peer_each = ours / place.size * 1e9, peer * 1e9
+            report([Row(stage, Kind.SHARE, 0.25, "cKDTree, vertices only", unit, ours_each, peer_each)])
 
 
 if __name__ == "__main__":

@@ -25,8 +25,12 @@ def simulate_program(
     options: ReadingOptions | None = None,
     *,
     record: bool = True,
+    all_signals: bool = False,
 ) -> Run:
     """Send a program through a machine, case by case.
+
+    The signals of a case are in memory up to 131,072 samples; of more, ``run.signal(case)`` has the extremes,
+    and its ``samples`` every one, from a nameless file, up to two million or `all_signals`.
 
     Parameters
     ----------
@@ -40,10 +44,12 @@ def simulate_program(
         How to read the file.
     record
         Keep the signals for a report.
+    all_signals
+        Keep every sample of them, however many there are.
     """
     picked = default_cases(setup) if cases is None else pick_cases(setup, cases)
     with open_motion(str(path), setup, options) as motion:
-        return run(motion.blocks, setup, picked, motion.name, record=record)
+        return run(motion.blocks, setup, picked, motion.name, record=record, all_signals=all_signals)
 
 
 def report_context(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.program import Motion, Note, Program
+from cnc_shape.program import XYZ, Motion, Note, Program
 from cnc_shape.toolpath import extent, rotary_travel, travel_lengths
 
 
@@ -33,9 +33,11 @@ class Census:
     notes: tuple[Note, ...]
 
 
-def feed_times(program: Program) -> FloatArray:
-    """Time of every straight feed and arc at its feed, (m,) s; 0 for others and for moves that go nowhere."""
-    length = travel_lengths(program)
+def feed_times(program: Program, length: FloatArray) -> FloatArray:
+    """Time of every straight feed and arc at its feed, (m,) s; 0 for others and for moves that go nowhere.
+
+    length: (m,) mm, their XYZ travel.
+    """
     travel = np.where(length > 0.0, length, rotary_travel(program))
     feeds = (program.motion == Motion.FEED) | (program.motion == Motion.ARC)
     return np.divide(travel, program.feed_rate, out=np.zeros_like(travel), where=feeds & (travel > 0.0))
@@ -51,8 +53,10 @@ def count(state: Census | None, program: Program) -> Census:
     kinds = program.motion
     length = travel_lengths(program)
     feeds = (kinds == Motion.FEED) | (kinds == Motion.ARC)
-    low, high = extent(program)
     moves = kinds != Motion.DWELL
+    low, high = extent(program)
+    if not moves.all():
+        low, high = low[moves], high[moves]
     at_first = np.flatnonzero(moves)[:1]
     if state.low[0] > state.high[0] and at_first.size and kinds[at_first[0]] != Motion.RAPID:
         here = program.start[
@@ -67,10 +71,10 @@ def count(state: Census | None, program: Program) -> Census:
         dwells=state.dwells + int(np.count_nonzero(kinds == Motion.DWELL)),
         rapid_length=_sum(state.rapid_length, length[kinds == Motion.RAPID]),
         feed_length=_sum(state.feed_length, length[feeds]),
-        feed_time=_sum(state.feed_time, feed_times(program)),
+        feed_time=_sum(state.feed_time, feed_times(program, length)),
         dwell=_sum(state.dwell, program.dwell),
-        low=frozen(np.minimum(state.low, low[moves, :3].min(axis=0, initial=np.inf))),
-        high=frozen(np.maximum(state.high, high[moves, :3].max(axis=0, initial=-np.inf))),
+        low=frozen([low[:, k].min(initial=state.low[k]) for k in range(len(XYZ))]),
+        high=frozen([high[:, k].max(initial=state.high[k]) for k in range(len(XYZ))]),
         position=program.end,
         notes=state.notes + program.notes,
     )

@@ -108,7 +108,7 @@ class Run:
     path: FloatArray  # (p,3) mm, the programmed path, arcs chopped for drawing
 
     def signal(self, case: str) -> Signals:
-        """Return the signals of the case called `case`."""
+        """Return the signals of the case called `case`; their extremes where there are many."""
         return next(signals for signals in self.signals if signals.case == case)
 
 
@@ -216,6 +216,7 @@ def run(
     program: str,
     *,
     record: bool = False,
+    all_signals: bool = False,
 ) -> Run:
     """Send a motion through every case and measure it.
 
@@ -231,11 +232,15 @@ def run(
         Its name in the table.
     record
         Keep the signals for a report.
+    all_signals
+        Keep every sample of them, however many there are.
 
     Raises
     ------
     InfeasibleError
-        A loop is unstable, or what `blocks` raises.
+        A loop is unstable, a signal that is recorded is not finite, or what `blocks` raises.
+    OutputError
+        The signals do not fit into the folder for temporary files.
     """
     trials: list[Trial] = []
     outline = Outline()
@@ -245,9 +250,11 @@ def run(
             axes = block.command.axes
             machine = setup.machine.with_axes(axes)
             period = setup.control.sample_time
-            trials = [
-                Trial(case, machine, Recorder(case.name, axes, period) if record else None) for case in cases
+            recorders = [
+                Recorder(case.name, axes, period, all_signals=all_signals) if record else None
+                for case in cases
             ]
+            trials = [Trial(case, machine, recorder) for case, recorder in zip(cases, recorders, strict=True)]
         if record and block.toolpath is not None:
             outline.add(block.toolpath)
         for trial in trials:

@@ -12,7 +12,7 @@ from cnc_shape.arrays import FloatArray, frozen, frozen_integers
 from cnc_shape.feedrate import Profile
 from cnc_shape.kernels.sampling import sample_pieces
 
-BLOCK = 65536  # samples in a chunk at most
+BLOCK = 16384  # samples in a chunk at most
 END_MARGIN = 1e-6  # -, of a sample: a motion that ends within it after a sample ends at it
 
 

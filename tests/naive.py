@@ -317,3 +317,21 @@ def excesses(profile, limits, points):
             ],
         )
     return worst
+
+
+# --- extremes of recorded signals -----------------------------------------------------------------
+
+
+def extremes(measures, width):
+    """Rows where a measure, (k,n), is largest in its bucket of `width` rows; the first of equals."""
+    buckets = range(0, measures.shape[1], width)
+    return np.unique([low + m[low : low + width].argmax() for low in buckets for m in measures])
+
+
+def sample_measures(rows, axes):
+    """What makes a sample worth keeping, (8,n), from its columns."""
+    command, drive, tool, velocity, acceleration = (rows[:, k * axes : k * axes + 3] for k in range(5))
+    command_error, drive_error, tool_error = rows[:, 5 * axes : 5 * axes + 3].T
+    squares = [((a - b) ** 2).sum(axis=1) for a, b in ((command, drive), (tool, drive), (velocity, 0.0))]
+    worst = np.abs(acceleration).max(axis=1)
+    return np.array([tool_error, drive_error, command_error, -tool_error, *squares, worst])

@@ -9,38 +9,62 @@ import numpy as np
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import Program, concatenate
-from cnc_shape.readers import read_program
+from cnc_shape.readers import ReadingOptions, read_program
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import Source
+from cnc_shape.readers.source import CHUNK_ROWS, ReadingLimits, Source
 
 DEFAULT = GcodeOptions()
+LIMITS = ReadingLimits()
 COLUMNS = [name for name in Program.__slots__ if name not in ("source", "axes", "notes")]
 
 
-def chunks(text: str | bytes, options: GcodeOptions = DEFAULT, name: str = "part.nc") -> list[Program]:
-    """Read G-code from memory, as chunks."""
+def from_memory(text: str | bytes, limits: ReadingLimits = LIMITS, name: str = "part.nc") -> Source:
+    """Text as a source."""
     data = text.encode() if isinstance(text, str) else text
-    source = Source(name, io.BytesIO(data), options.limits)
-    return list(interpret(source, survey(source, options.dialect), options))
+    return Source(name, io.BytesIO(data), limits, len(data))
 
 
-def read(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program:
+def chunks(
+    text: str | bytes,
+    options: GcodeOptions = DEFAULT,
+    *,
+    rows: int = CHUNK_ROWS,
+    limits: ReadingLimits = LIMITS,
+) -> list[Program]:
+    """Read G-code from memory, as chunks."""
+    source = from_memory(text, limits)
+    return list(interpret(source, survey(source, options.dialect), options, rows))
+
+
+def read(
+    text: str | bytes,
+    options: GcodeOptions = DEFAULT,
+    *,
+    rows: int = CHUNK_ROWS,
+    limits: ReadingLimits = LIMITS,
+) -> Program:
     """Read G-code from memory."""
-    return concatenate(chunks(text, options))
+    return concatenate(chunks(text, options, rows=rows, limits=limits))
 
 
-def attempt(text: str | bytes, options: GcodeOptions = DEFAULT) -> Program | ProgramError:
+def attempt(
+    text: str | bytes,
+    options: GcodeOptions = DEFAULT,
+    *,
+    rows: int = CHUNK_ROWS,
+    limits: ReadingLimits = LIMITS,
+) -> Program | ProgramError:
     """Read G-code from memory; a refusal is an answer too."""
     try:
-        return read(text, options)
+        return read(text, options, rows=rows, limits=limits)
     except ProgramError as error:
         return error
 
 
-def attempt_file(path: Path) -> Program | ProgramError:
+def attempt_file(path: Path, options: GcodeOptions = DEFAULT) -> Program | ProgramError:
     """Read a file; a refusal is an answer too."""
     try:
-        return read_program(path)
+        return read_program(path, ReadingOptions(gcode=options))
     except ProgramError as error:
         return error
 

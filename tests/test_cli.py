@@ -69,6 +69,19 @@ def test_nothing_heavy_is_imported_to_explain_a_command(command: Callable[..., o
     )  # typer itself may use pydantic
 
 
+@pytest.mark.parametrize(
+    ("words", "spared"),
+    [
+        (["check", "samples/bracket.nc"], ("numba", "scipy", "matplotlib", "jinja2", "yaml")),
+        (["simulate", "samples/bracket.nc"], ("matplotlib", "jinja2", "scipy.signal", "scipy.optimize")),
+    ],
+)
+def test_a_command_imports_no_more_than_it_needs(words: list[str], spared: tuple[str, ...]) -> None:
+    ask = ASK.replace(repr(HEAVY), repr(spared))
+    done = python(ask, *words, "--quiet")
+    assert done.stderr.endswith("(0, [])"), done.stderr
+
+
 def test_help_is_there_at_once() -> None:
     used: list[float] = []
     for _ in range(3):

@@ -89,6 +89,26 @@ def test_the_run_folder_holds_what_the_table_says_and_is_the_same_to_the_byte(pl
     assert_allclose(1e3 * worst, result["cases"][1]["tool_contour_max_um"], rtol=1e-12)
 
 
+def test_all_signals_are_asked_for_with_a_report(place, capfd, monkeypatch):
+    message = refused(capfd, "simulate", "part.nc", "--all-signals")
+    assert "--all-signals has no report" in message
+    assert "--report" in message
+    monkeypatch.setattr(
+        "cnc_shape.recording.recorder.Recorder.__init__.__kwdefaults__",
+        {"all_signals": False, "kept": 100, "buckets": 4},
+    )
+    answer(capfd, "simulate", "part.nc", "-o", "few", "--cases", "unshaped")
+    samples = answer(capfd, "simulate", "part.nc", "-o", "all", "--cases", "unshaped", "--all-signals")[
+        "samples"
+    ]
+    for name, fewest, most in (("few", 8, 32), ("all", samples, samples)):
+        signals = np.load(place / name / "signals.npz")
+        assert fewest <= signals["unshaped/time_s"].size <= most
+        assert (signals["unshaped/decimation"] == 1) == (name == "all")
+    assert json.loads((place / "all" / "run.json").read_text())["command"][-1] == "--all-signals"
+    assert "--all-signals" not in (place / "few" / "run.json").read_text()
+
+
 def test_simulate_picks_cases_and_is_a_gate(place, capfd):
     assert run(["simulate", "part.nc", "--cases", "unshaped", "--fail-on", "max_tool_contour_um>1"]) == 1
     assert "gate failed: max_tool_contour_um of unshaped" in capfd.readouterr().err

@@ -14,11 +14,15 @@ import pytest
 from numpy.testing import assert_array_equal
 from runs import MODE, PROGRAM, TEXT, make_run, shaper
 
-from cnc_shape.arrays import frozen
+from cnc_shape.arrays import frozen, frozen_integers
+from cnc_shape.contour import ContourError
 from cnc_shape.errors import InfeasibleError, OutputError
+from cnc_shape.recording import Recorder
 from cnc_shape.report import figures
 from cnc_shape.report.folder import RUNS, Context, default_folder, write_report
 from cnc_shape.report.table import summary_json
+from cnc_shape.simulation import Response
+from cnc_shape.trajectory import Trajectory
 
 RUN = make_run(600)
 CONTEXT = Context(
@@ -173,3 +177,69 @@ def test_figures_come_in_the_format_asked_for(tmp_path, quick):
 def test_a_run_without_signals_is_our_own_bug(tmp_path):
     with pytest.raises(ValueError, match="signals"):
         write_report(replace(RUN, signals=()), tmp_path / "run", CONTEXT)
+
+
+def thinned(samples: int, **limits):
+    """The run of `RUN`'s kind as a recorder keeps it, whole and thinned."""
+    whole = make_run(samples)
+    signals = tuple(recorded(case, **limits) for case in whole.signals)
+    return whole, replace(whole, signals=signals)
+
+
+def recorded(case, **limits):
+    recorder = Recorder(case.case, case.axes, float(case.time[1]), buckets=32, **limits)
+    for low in range(0, case.time.size, 700):
+        part = {
+            name: frozen(getattr(case, name)[low : low + 700])
+            for name in (
+                "command", "position", "tool", "velocity", "acceleration", "command_error", "drive_error",
+                "tool_error", "foot", "time",
+            )
+        }  # fmt: skip
+        lines = frozen_integers(case.line[low : low + 700])
+        command = Trajectory(
+            case.axes, float(case.time[1]), part["time"], part["command"], part["velocity"], part["acceleration"]
+        )  # fmt: skip
+        errors = [
+            ContourError(part[name], part["foot"], part["time"], lines)
+            for name in ("command_error", "drive_error", "tool_error")
+        ]
+        recorder.add(
+            Response(command, part["position"], part["position"], part["tool"], part["position"]), errors
+        )
+    return recorder.signals(case.settling)
+
+
+@pytest.mark.parametrize("limits", [{"kept": 5000}, {"kept": 10, "all_signals": True}])
+def test_signals_that_are_not_in_memory_are_written_as_if_they_were(tmp_path, quick, limits):
+    whole, run = thinned(5000, **limits)
+    assert run.signals[0].factor > 1
+    write_report(whole, tmp_path / "whole", CONTEXT)
+    write_report(run, tmp_path / "run", CONTEXT)
+    with (
+        np.load(tmp_path / "whole" / "signals.npz") as mine,
+        np.load(tmp_path / "run" / "signals.npz") as theirs,
+    ):
+        assert mine.files == theirs.files
+        for name in mine.files:
+            if not name.endswith("time_s"):  # a product here, a sum there
+                assert_array_equal(mine[name], theirs[name])
+            assert mine[name].dtype == theirs[name].dtype
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "extremes of every" in page
+    assert "1 : " not in page
+
+
+def test_signals_beyond_the_limit_are_thinned_and_say_so(tmp_path, quick):
+    whole, run = thinned(5000, kept=4999)
+    write_report(run, tmp_path / "run", CONTEXT)
+    results = summary_json(whole.summary)["cases"]
+    with np.load(tmp_path / "run" / "signals.npz") as signals:
+        for case in results:
+            name = case["name"]
+            assert signals[f"{name}/decimation"] == run.signal(name).factor == 32
+            assert signals[f"{name}/time_s"].size <= 256
+            for array, key in (("command_", "command_"), ("", ""), ("tool_", "tool_")):
+                worst = 1e3 * signals[f"{name}/{array}contour_error_mm"].max()
+                assert worst == pytest.approx(case[f"{key}contour_max_um"], rel=1e-15)
+    assert "1 : 32, the extremes of every 256" in (tmp_path / "run" / "report.html").read_text()

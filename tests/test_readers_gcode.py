@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from programs import DEFAULT, assert_same, attempt, chunks, messages, read
+from programs import DEFAULT, assert_same, attempt, chunks, from_memory, messages, read
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import Motion, PathMode
@@ -338,7 +338,7 @@ def test_what_is_refused_and_where(text, column, reason):
 )
 def test_limits_are_named_when_hit(limits, text, reason):
     with pytest.raises(ProgramError, match=reason):
-        read(text, GcodeOptions(limits=limits))
+        read(text, limits=limits)
 
 
 # dialects
@@ -361,12 +361,9 @@ def test_limits_are_named_when_hit(limits, text, reason):
     ],
 )
 def test_the_dialect_follows_from_evidence(text, dialect):
-    from io import BytesIO
-
     from cnc_shape.readers.gcode import survey
-    from cnc_shape.readers.source import Source
 
-    seen = survey(Source("part.nc", BytesIO(text.encode()), ReadingLimits()), None)
+    seen = survey(from_memory(text), None)
     assert seen.dialect.value == dialect
     assert seen.evidence
     read(text)
@@ -435,48 +432,7 @@ def test_machine_codes_are_noted_once_each_kind():
     assert program.dwell.tolist() == [1.0]
 
 
-# chunks, and the quick way
-
-MODES = [
-    "G91",
-    "G90",
-    "G20",
-    "G21",
-    "G93",
-    "G94",
-    "F50",
-    "G92 X1",
-    "G92.1",
-    "G7",
-    "G8",
-    "G43.1 Z1",
-    "G61",
-    "G64 P.1",
-]
-CURVES = ["G3 I2 J1", "G4 P.1", "G0 A45", "G1", "G1 X1 X2", "X1e3", "G1 F0 X1", "(c)", ";"]
-axis_words = st.tuples(
-    st.sampled_from(["", "G0", "G1", "G01", "N5 G0"]),
-    st.sampled_from(["", "X1", "X-2.5", "x 1 2"]),
-    st.sampled_from(["", "Y3", "Y-.5"]),
-    st.sampled_from(["", "Z.5", "A45"]),
-    st.sampled_from(["", "", "F100", "F200.5"]),
-).map(" ".join)
-PROGRAMS = st.lists(
-    axis_words | axis_words | st.sampled_from(MODES) | st.sampled_from(CURVES), max_size=25
-).map(lambda lines: "\n".join(["G1 F100 X0", *lines]))
-
-
-@given(PROGRAMS)
-@settings(max_examples=300)
-def test_the_quick_way_reads_what_the_readable_one_does(text):
-    for dialect in (Dialect.RS274, Dialect.MARLIN):
-        quick = attempt(text, GcodeOptions(dialect=dialect))
-        readable = attempt(text, GcodeOptions(dialect=dialect, plain_moves=False))
-        if isinstance(quick, ProgramError) or isinstance(readable, ProgramError):
-            assert str(quick) == str(readable)
-        else:
-            assert_same(quick, readable)
-
+# chunks
 
 LONG = "F100 G0 X1\n" + "G1 X2 Y1\nG3 X3 I.5 J.2\nG93 G1 X1 A10 F9\nG94\nF50\nG4 P1\nG1 A0\n" * 40 + "M2\n"
 LONG = LONG.replace("G3 X3 I.5 J.2", "G3 X3 Y1 I.5")
@@ -484,13 +440,13 @@ LONG = LONG.replace("G3 X3 I.5 J.2", "G3 X3 Y1 I.5")
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 1000])
 def test_chunks_of_any_size_hold_the_same_bits(rows):
-    whole = read(LONG, GcodeOptions(rows=10**9))
-    parts = chunks(LONG, GcodeOptions(rows=rows))
+    whole = read(LONG, rows=10**9)
+    parts = chunks(LONG, rows=rows)
     assert len(parts) > 1 or rows == 1000
     assert all(len(part) == rows for part in parts[:-1])
     for before, after in pairwise(parts):
         np.testing.assert_array_equal(before.end, after.start)
-    assert_same(read(LONG, GcodeOptions(rows=rows)), whole)
+    assert_same(read(LONG, rows=rows), whole)
 
 
 ANY_TEXT = st.text(alphabet="GMXYZABCIJKRPQFSTNOHE0123456789.-+ ()%;/#[]\n\t$*=", max_size=120)

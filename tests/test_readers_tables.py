@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from programs import assert_same
+from programs import assert_same, from_memory
 from programs import read as read_gcode
 
 from cnc_shape.errors import InfeasibleError, OptionError, ProgramError
@@ -77,7 +76,7 @@ points = st.lists(
 def test_gcode_and_csv_of_one_shape_give_equal_toolpaths(shape):
     gcode = "".join(f"G1 X{x} Y{y} A{a} F{f}\n" for x, y, a, f in shape) + "M2\n"
     table = "x_mm,y_mm,a_deg,feed_mm_min\n0,0,0,1\n" + "".join(f"{x},{y},{a},{f}\n" for x, y, a, f in shape)
-    one, other = build_toolpath(read_gcode(gcode + "(A0)")), build_toolpath(from_memory(table))
+    one, other = build_toolpath(read_gcode(gcode + "(A0)")), build_toolpath(read_table(table))
     for name in set(Toolpath.__slots__) - {"source", "line"}:
         if isinstance(getattr(one, name), np.ndarray):
             assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-15, err_msg=name)
@@ -86,11 +85,10 @@ def test_gcode_and_csv_of_one_shape_give_equal_toolpaths(shape):
     assert_array_equal(one.line + 2, other.line)
 
 
-def from_memory(text: str) -> Program:
+def read_table(text: str) -> Program:
     from cnc_shape.readers import table_reading
-    from cnc_shape.readers.source import Source
 
-    source = Source("path.csv", io.BytesIO(text.encode()), ReadingLimits())
+    source = from_memory(text, name="path.csv")
     return concatenate(table_reading(source, ReadingOptions()).chunks)
 
 
@@ -129,7 +127,7 @@ def test_what_is_refused_and_where(file, text, line, column, reason):
 def test_no_text_ends_in_anything_but_an_answer(text):
     for head in ("", "x_mm,y_mm\n", "time_s,x_mm\n0,0\n"):
         try:
-            program = from_memory(head + text)
+            program = read_table(head + text)
         except ProgramError:
             continue
         assert np.isfinite(program.target).all()
@@ -223,5 +221,5 @@ def test_line_ends_across_the_border_of_two_blocks(monkeypatch, end):
     text = end.join(["G0 X1", "", "G0 X22", "", "", "M2"])
     for size in range(1, len(text) + 2):
         monkeypatch.setattr(source, "BLOCK_BYTES", size)
-        opened = source.Source("a.nc", io.BytesIO(text.encode()), ReadingLimits())
+        opened = from_memory(text)
         assert list(source.lines(opened)) == list(enumerate(["G0 X1", "", "G0 X22", "", "", "M2"], 1))

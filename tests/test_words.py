@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from runs import make_run
@@ -76,6 +76,23 @@ def test_a_place_tells_what_the_first_case_did_on_its_line():
     first = RUN.signals[0]
     for place in worst_places(RUN, "shaped"):
         assert place.first_error == first.tool_error[first.line == place.line].max()
+
+
+def test_a_thinned_case_tells_of_the_first_case_what_it_has():
+    few = np.zeros(RUN.signals[0].time.size, dtype=bool)
+    few[::10] = True
+    first = RUN.signals[0]
+    cut = {
+        item.name: getattr(first, item.name)[few]
+        for item in fields(first)
+        if getattr(getattr(first, item.name), "shape", (0,))[0] == few.size
+    }
+    places = worst_places(replace(RUN, signals=(replace(first, factor=5, **cut), *RUN.signals[1:])), "shaped")
+    assert not any(place.exact for place in places)
+    for place in places:
+        on_line = cut["tool_error"][cut["line"] == place.line]
+        assert place.first_error == (on_line.max() if on_line.size else None)
+    assert all(place.exact for place in worst_places(RUN, "shaped"))
 
 
 def test_a_perfect_case_has_no_worst_place():

@@ -8,6 +8,7 @@ once. In a docstring write ``\[`` for ``[``: help is rich markup.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -21,12 +22,15 @@ from cnc_shape import __version__
 from cnc_shape.cli.apply import apply
 from cnc_shape.cli.check import check
 from cnc_shape.cli.design import design
+from cnc_shape.cli.doctor import doctor
 from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
 from cnc_shape.cli.init import init
 from cnc_shape.cli.output import print_text
 from cnc_shape.cli.simulate import simulate
 
-COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init)
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init, doctor)
+
+GARBAGE_THRESHOLD: Final = 20_000  # objects made before the first generation is searched
 
 app = typer.Typer(
     name="cnc-shape",
@@ -73,12 +77,29 @@ def _terminate(signum: int, frame: FrameType | None) -> None:
     raise Terminated
 
 
+def start_quickly() -> None:
+    """Settle what must be settled before anything heavy is imported.
+
+    Modules are hundreds of thousands of objects that stay: to search them for garbage after every few hundred
+    is a tenth of a short run. And all matrices here are of a few rows, for which the threads of a BLAS only
+    wait for each other, milliseconds each where the machine is busy; whoever sets their number has it.
+    The loops of the kernels run over a few axes, too: code for vectors takes longer to compile and to run.
+    """
+    gc.set_threshold(GARBAGE_THRESHOLD, 10, 10)
+    for library in ("OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    os.environ.setdefault("NUMBA_LOOP_VECTORIZE", "0")
+
+
 def main() -> None:
     """Run the command line of this process and leave with its exit code."""
+    start_quickly()
     signal.signal(signal.SIGTERM, _terminate)
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115  # closed by whoever started us
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):  # a file name need not be text
         if reconfigure := getattr(stream, "reconfigure", None):
             reconfigure(errors="backslashreplace")
-    sys.exit(run(sys.argv[1:]))
+    status = run(sys.argv[1:])
+    gc.freeze()  # the interpreter need not search what it is about to drop: a quarter of a second
+    sys.exit(status)

@@ -32,7 +32,7 @@ def apply(
     """Shape a program's axis commands and write them at the servo period."""
     from cnc_shape.applying import Application
     from cnc_shape.cli.output import print_json, print_text, warn
-    from cnc_shape.cli.progress import announce_compilation, progress
+    from cnc_shape.cli.progress import progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.errors import OptionError
@@ -44,7 +44,6 @@ def apply(
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     shapers = setup.acting_shapers
-    announce_compilation(quiet=quiet or json)
     with open_motion(file, setup, options) as motion, progress("applying", None, quiet=quiet or json):
         work = Application(motion.blocks, setup.machine, shapers, setup.control.sample_time)
         _write(work, target, force=force)

@@ -45,6 +45,7 @@ def check(
     """Read and validate files: what they count, how long they are, how far they reach."""
     from cnc_shape.cli.errors import DONE, WRONG_INPUT, error_object, report_error
     from cnc_shape.cli.output import print_json
+    from cnc_shape.cli.progress import progress
     from cnc_shape.cli.reading import limited, named_options
     from cnc_shape.errors import CncShapeError
 
@@ -61,7 +62,8 @@ def check(
     status = DONE
     for file in files:
         try:
-            result = _check(file, options, points)
+            with progress("reading", None, quiet=quiet or json):
+                result = _check(file, options, points)
         except CncShapeError as error:
             if len(files) == 1:
                 raise

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
+from cnc_shape.cli.output import print_error
+
 Advance = Callable[[float], None]
 
 
-def announce_compilation(*, quiet: bool) -> None:
-    """Say so when the kernels have to be compiled first: it happens once, and takes its time."""
-    from cnc_shape.kernels import compiled_before
+class _Told(logging.Handler):
+    """What the kernels log, on stderr."""
 
-    if not quiet and not compiled_before():
-        sys.stderr.write("compiling the numerical kernels for this processor, once: some twenty seconds\n")
+    def emit(self, record: logging.LogRecord) -> None:
+        print_error(record.getMessage())
 
 
 @contextmanager
 def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advance]:
     """Show a bar for `what`; the body calls the value with how much of `total` it has just done.
+
+    Where the body has to compile kernels, which happens once and takes its time, one line says so.
 
     Parameters
     ----------
@@ -28,9 +32,26 @@ def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advanc
     total
         How much there is to do, in any unit, or None where that is not known.
     quiet
-        Show nothing (``--quiet``, ``--json``). Nothing is shown either unless stderr is a terminal.
+        Show and say nothing (``--quiet``, ``--json``). No bar is shown either unless stderr is a terminal.
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet:
+        yield lambda amount: None
+        return
+    kernels, told = logging.getLogger("cnc_shape.kernels"), _Told()
+    level = kernels.level
+    kernels.addHandler(told)
+    kernels.setLevel(logging.INFO)
+    try:
+        with _bar(what, total) as advance:
+            yield advance
+    finally:
+        kernels.setLevel(level)
+        kernels.removeHandler(told)
+
+
+@contextmanager
+def _bar(what: str, total: float | None) -> Generator[Advance]:
+    if not sys.stderr.isatty():
         yield lambda amount: None
         return
     from rich.console import Console

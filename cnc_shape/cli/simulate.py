@@ -31,6 +31,10 @@ def simulate(
     output: Annotated[
         str | None, typer.Option("-o", "--output", metavar="DIR", help="The run folder; implies --report.")
     ] = None,
+    all_signals: Annotated[
+        bool,
+        typer.Option("--all-signals", help="With --report: every sample in signals.npz, however many."),
+    ] = False,
     cases: Annotated[
         str | None, typer.Option(metavar="A,B", help="Rows of the table, such as unshaped,shaped.")
     ] = None,
@@ -48,11 +52,10 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
-    from cnc_shape.api import report_context
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
     from cnc_shape.cli.output import print_error, print_json, warn
-    from cnc_shape.cli.progress import announce_compilation, progress
+    from cnc_shape.cli.progress import progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
@@ -67,16 +70,21 @@ def simulate(
         default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
     )
     wanted = report or output is not None
+    _check_wanted(wanted, all_signals=all_signals)
     if output is not None:
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    announce_compilation(quiet=quiet or json)
     with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
-        result = run(motion.blocks, setup, picked, motion.name, record=wanted)
+        result = run(motion.blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals)
     page = None
     if wanted:
-        command = ["simulate", motion.name, *(["--cases", cases] if cases else [])]
+        from cnc_shape.api import report_context
+
+        command = [
+            "simulate", motion.name, *(["--cases", cases] if cases else []),
+            *(["--all-signals"] if all_signals else []),
+        ]  # fmt: skip
         context = report_context([source], setup, command, motion.warnings(by_name=True), kind)
         page = _report(result, output, context, force=force)
     warn(motion.warnings(), quiet=quiet)
@@ -98,6 +106,13 @@ def _figure_format(text: str) -> Format:
     if text not in formats:
         raise OptionError(f"figures come as {', '.join(formats)}, not {text!r}")
     return formats[text]
+
+
+def _check_wanted(report: bool, *, all_signals: bool) -> None:
+    from cnc_shape.errors import OptionError
+
+    if all_signals and not report:
+        raise OptionError("--all-signals has no report to write them to", hint="add --report, or -o DIR")
 
 
 def _check_folder(folder: Path, *, force: bool) -> None:

@@ -25,9 +25,9 @@ def servo_loop(
     changed in place. Returns drive position, tool and velocity command, (n,d) each.
     """
     n, axes = position.shape[0] - 1, position.shape[1]
-    joint, tool, drive = np.empty((n, axes)), np.empty((n, axes)), np.zeros((n, axes))
+    joint, tool, drive = np.empty((n, axes)), np.empty((n, axes)), np.empty((n, axes))
     following, mean_velocity, mean_acceleration = np.empty(axes), np.empty(axes), np.empty(axes)
-    following_state = np.empty(plant.shape[1])
+    command = np.empty(axes)
     for k in range(n):
         speed_v2 = 0.0
         for a in range(axes):
@@ -36,6 +36,7 @@ def servo_loop(
             for i in range(2, states[a], 2):
                 tool[k, a] += plant[a, i]
             following[a] = position[k, a] - plant[a, 0]
+            command[a] = 0.0
             mean_velocity[a] = (position[k + 1, a] - position[k, a]) / sample_time
             mean_acceleration[a] = (velocity[k + 1, a] - velocity[k, a]) / sample_time
             if a < 3:
@@ -43,13 +44,13 @@ def servo_loop(
         if speed_v2 > 0.0:
             for a in range(3):
                 tangent[a] = velocity[k, a] / np.sqrt(speed_v2)
-        command = drive[k]
         position_loop.step(position_gains, following, command)
         if feed:
             feedforward.step(feed_gains, mean_velocity, mean_acceleration, command)
         if couple:
             cross_coupling.step(couple_gains, following, tangent, command)
         for a in range(axes):
+            drive[k, a] = command[a]
             s = states[a]
             if ideal[a]:
                 # acceleration of the cubic through both samples: c0 at its start, c1 more at its end
@@ -64,13 +65,17 @@ def servo_loop(
                     for i in range(late.shape[0] - 1):
                         late[i, a] = late[i + 1, a]
                     late[late.shape[0] - 1, a] = command[a]
-            for i in range(s):
-                value = held[a, i] * c0 + rising[a, i] * c1
-                for j in range(s):
-                    value += transition[a, i, j] * plant[a, j]
-                following_state[i] = value
-            for i in range(s):
-                plant[a, i] = following_state[i]
+            # the drive answers itself alone, a mode the drive and itself: all else in `transition` is zero
+            q, v = plant[a, 0], plant[a, 1]
+            for i in range(2, s, 2):
+                d, w = plant[a, i], plant[a, i + 1]
+                for j in range(i, i + 2):
+                    free = transition[a, j, 0] * q + transition[a, j, 1] * v
+                    free += transition[a, j, i] * d + transition[a, j, i + 1] * w
+                    plant[a, j] = held[a, j] * c0 + rising[a, j] * c1 + free
+            for j in range(2):
+                free = transition[a, j, 0] * q + transition[a, j, 1] * v
+                plant[a, j] = held[a, j] * c0 + rising[a, j] * c1 + free
             if ideal[a]:
                 plant[a, 0] = position[k + 1, a]
                 plant[a, 1] = velocity[k + 1, a]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 from cnc_shape.errors import OptionError, ProgramError
 from cnc_shape.program import Program, concatenate
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import ReadingLimits, Source, lines, open_source
+from cnc_shape.readers.source import (
+    CHUNK_ROWS,
+    ReadingLimits,
+    Source,
+    blocks,
+    count_lines,
+    lines,
+    open_source,
+)
 from cnc_shape.readers.table import TIME, is_table, read_header
 from cnc_shape.readers.timed import TimedPoints, read_timed_points, timed_program
 from cnc_shape.readers.waypoints import read_waypoints
@@ -39,7 +47,7 @@ class ReadingOptions:
     gcode: GcodeOptions = field(default_factory=GcodeOptions)
     curve: Curve = Curve.POLYLINE  # of way-points
     closed: bool = False  # way-points return to the first
-    rows: int = 16384  # of a chunk
+    rows: int = CHUNK_ROWS  # of a chunk
     limits: ReadingLimits = field(default_factory=ReadingLimits)
 
 
@@ -62,7 +70,7 @@ Reader = Callable[[Source, ReadingOptions], Reading]
 def gcode_reading(source: Source, options: ReadingOptions) -> Reading:
     """Read a program of G-code."""
     seen = survey(source, options.gcode.dialect)
-    chunks = interpret(source, seen, replace(options.gcode, rows=options.rows, limits=options.limits))
+    chunks = interpret(source, seen, options.gcode, rows=options.rows)
     return Reading(source.name, seen.dialect.value, seen.lines, seen.axes, chunks, evidence=seen.evidence)
 
 
@@ -71,9 +79,9 @@ def table_reading(source: Source, options: ReadingOptions) -> Reading:
     if options.curve is not Curve.POLYLINE:
         raise OptionError(f"--path {options.curve.value} is not built yet", hint="take --path polyline")
     header = read_header(source)
-    count = sum(1 for _ in lines(source))
+    count = sum(count_lines(block) for block in blocks(source))
     if TIME in header.names:
-        points = read_timed_points(source, header)
+        points = read_timed_points(source, header, rows=options.rows)
         return Reading(source.name, CSV, count, header.axes, iter([timed_program(points)]), points)
     chunks = read_waypoints(source, header, closed=options.closed, rows=options.rows)
     return Reading(source.name, CSV, count, header.axes, chunks)

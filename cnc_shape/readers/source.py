@@ -8,14 +8,21 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cnc_shape.errors import ProgramError
 
 BLOCK_BYTES = 1 << 20  # read at once
+CHUNK_ROWS = 4096  # moves that are handed on together
+COMPILED_FROM = 1 << 16  # bytes: reading a shorter text takes less time than loading compiled code
 STANDARD_INPUT = "-"
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 UTF8_MARK = b"\xef\xbb\xbf"
+
+Bytes: TypeAlias = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +47,7 @@ class Source:
     name: str
     stream: BinaryIO
     limits: ReadingLimits
+    size: int  # bytes
 
 
 @contextmanager
@@ -57,7 +65,7 @@ def open_source(path: str | Path, limits: ReadingLimits) -> Generator[Source]:
     try:
         with _faults(name):
             stream = _seekable(name, handle, limits)
-        yield Source(name, stream, limits)
+        yield Source(name, stream, limits, stream.seek(0, io.SEEK_END))
     finally:
         if handle is not sys.stdin.buffer:
             handle.close()
@@ -123,6 +131,22 @@ def blocks(source: Source) -> Iterator[bytes]:
         yield rest
 
 
+def as_bytes(text: bytes) -> Bytes:
+    """View text as an array."""
+    return np.frombuffer(text, dtype=np.uint8)
+
+
+def line_at(block: bytes, at: int) -> bytes:
+    """Return the line that begins at `at`, without its end."""
+    end = block.find(b"\n", at)
+    return block[at : end if end >= 0 else len(block)]
+
+
+def count_lines(block: bytes) -> int:
+    """Count the lines of a block: the last may lack its end."""
+    return block.count(b"\n") + (not block.endswith(b"\n"))
+
+
 def lines(source: Source) -> Iterator[tuple[int, str]]:
     """Yield ``(number, text)`` of every line from 1; text without its line end.
 
@@ -133,24 +157,30 @@ def lines(source: Source) -> Iterator[tuple[int, str]]:
     """
     number = 0
     for block in blocks(source):
-        harmless = b"\0" not in block and block.isascii()
         for line in block.removesuffix(b"\n").split(b"\n"):
             number += 1
-            if len(line) > source.limits.line_bytes:
-                raise ProgramError(
-                    source.name,
-                    number,
-                    source.limits.line_bytes + 1,
-                    f"the line is longer than the limit of {source.limits.line_bytes} bytes",
-                    hint="raise the limit of the line length, if this is a program at all",
-                )
-            if not harmless and b"\0" in line:
-                column = len(line[: line.index(b"\0")].decode("utf-8", "replace")) + 1
-                raise ProgramError(
-                    source.name,
-                    number,
-                    column,
-                    "NUL byte in the text",
-                    hint="this is a binary or damaged file",
-                )
-            yield number, line.decode("ascii" if harmless else "utf-8", "replace")
+            yield number, text_of(source.name, number, line, source.limits)
+
+
+def text_of(name: str, number: int, line: bytes, limits: ReadingLimits) -> str:
+    """Return line `number` of the text called `name`, without its line end, as text.
+
+    Raises
+    ------
+    ProgramError
+        At a NUL byte, and where the line is longer than ``limits.line_bytes``.
+    """
+    if len(line) > limits.line_bytes:
+        raise ProgramError(
+            name,
+            number,
+            limits.line_bytes + 1,
+            f"the line is longer than the limit of {limits.line_bytes} bytes",
+            hint="raise the limit of the line length, if this is a program at all",
+        )
+    if b"\0" in line:
+        column = len(line[: line.index(b"\0")].decode("utf-8", "replace")) + 1
+        raise ProgramError(
+            name, number, column, "NUL byte in the text", hint="this is a binary or damaged file"
+        )
+    return line.decode("utf-8", "replace")

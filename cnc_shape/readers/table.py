@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+import numpy as np
+
+from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import ROTARY, XYZ
-from cnc_shape.readers.source import Source, lines
+from cnc_shape.readers.source import (
+    CHUNK_ROWS,
+    COMPILED_FROM,
+    Bytes,
+    Source,
+    as_bytes,
+    blocks,
+    line_at,
+    lines,
+    text_of,
+)
 from cnc_shape.units import DEGREE, MM_PER_INCH, MM_PER_MIN
 
 _LENGTHS = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1e3, "in": MM_PER_INCH}
@@ -84,41 +97,120 @@ def read_header(source: Source) -> Header:
     return Header(tuple(names), tuple(scales))
 
 
-def read_rows(source: Source, header: Header) -> Iterator[tuple[int, list[float]]]:
-    """Yield ``(line, values)`` of each row in mm, rad, s and mm/s; blank lines are skipped.
+@dataclass(frozen=True, eq=False, slots=True)
+class Rows:
+    """Consecutive rows of a table."""
+
+    line: IntArray  # (m,)
+    values: FloatArray  # (m,c) mm, rad, s and mm/s
+
+    def cut(self, rows: slice) -> Rows:
+        """Return some of the rows."""
+        return Rows(self.line[rows], self.values[rows])
+
+
+def join_rows(parts: Sequence[Rows]) -> Rows:
+    """Consecutive rows, at least one part, as one."""
+    return Rows(
+        frozen_integers(np.concatenate([part.line for part in parts])),
+        frozen(np.concatenate([part.values for part in parts])),
+    )
+
+
+def read_rows(
+    source: Source, header: Header, rows: int = CHUNK_ROWS, compiled_from: int = COMPILED_FROM
+) -> Iterator[Rows]:
+    """Yield the rows of a table, at most `rows` at a time; blank lines are skipped.
+
+    In a text of `compiled_from` bytes or more plain rows take the compiled way; the answer is the same.
 
     Raises
     ------
     ProgramError
-        A ragged row, text, an infinite or a huge number.
+        A ragged row, text, an infinite or a huge number; once the rows before it have been handed on.
     """
-    pattern = re.compile(",".join([_CELL] * len(header.names)))
-    limit = source.limits.coordinate
-    limits = [
-        limit * (DEGREE if name in ROTARY else 1.0) if name in (*XYZ, *ROTARY) else 1e12
-        for name in header.names
-    ]
-    ahead = True
-    for number, line in lines(source):
-        if not line.strip():
-            continue
-        if ahead:
-            ahead = False
-            continue
-        match = pattern.fullmatch(line)
+    readable = _RowReader(source, header)
+    compiled = source.size >= compiled_from
+    values, line = np.empty((rows, len(header.names))), np.empty(rows, dtype=np.int64)
+    count = number = 0
+    ahead = True  # the header is still to come
+
+    def handed_on() -> Rows:
+        return Rows(frozen_integers(line[:count].copy()), frozen(values[:count].copy()))
+
+    for block in blocks(source):
+        text = as_bytes(block)
+        at = 0
+        while at < len(block):
+            if compiled and not ahead:
+                at, taken, count = _take_plain_rows(text, at, number, readable, values, line, count)
+                number += taken
+            if at < len(block) and count < rows:
+                here = line_at(block, at)
+                at += len(here) + 1
+                number += 1
+                try:
+                    row = readable.row(number, here, ahead=ahead)
+                except ProgramError:
+                    if count:
+                        yield handed_on()
+                    raise
+                if row is not None:
+                    values[count], line[count] = row, number
+                    count += 1
+                ahead = ahead and not here.strip()
+            if count == rows:
+                yield handed_on()
+                count = 0
+    if count:
+        yield handed_on()
+
+
+def _take_plain_rows(
+    text: Bytes, at: int, number: int, reader: _RowReader, values: FloatArray, line: IntArray, count: int
+) -> tuple[int, int, int]:
+    from cnc_shape.kernels.plain_rows import plain_rows  # a short table need not load compiled code
+
+    return plain_rows(text, at, number, reader.line_bytes, reader.scales, reader.bounds, values, line, count)
+
+
+class _RowReader:
+    """The readable way: one line at a time."""
+
+    def __init__(self, source: Source, header: Header) -> None:
+        self._source, self._header = source, header
+        self._pattern = re.compile(",".join([_CELL] * len(header.names)))
+        limit = source.limits.coordinate
+        self.line_bytes = source.limits.line_bytes
+        self.scales: FloatArray = np.array(header.scales)
+        self.bounds: FloatArray = np.array(
+            [
+                limit * (DEGREE if name in ROTARY else 1.0) if name in (*XYZ, *ROTARY) else 1e12
+                for name in header.names
+            ]
+        )
+
+    def row(self, number: int, line: bytes, *, ahead: bool) -> FloatArray | None:
+        """Return the values of a line, None if it is blank or the header."""
+        name, header = self._source.name, self._header
+        text = text_of(name, number, line, self._source.limits)
+        if ahead or not text.strip():
+            return None
+        match = self._pattern.fullmatch(text)
         if match is None:
-            raise _diagnose(source.name, number, line, header)
-        values = [float(text) * scale for text, scale in zip(match.groups(), header.scales, strict=True)]
-        for place, (value, bound) in enumerate(zip(values, limits, strict=True)):
-            if not -bound <= value <= bound:
-                raise ProgramError(
-                    source.name,
-                    number,
-                    match.start(place + 1) + 1,
-                    f"{header.names[place]} is beyond the limit of {bound / header.scales[place]:g}",
-                    hint="check the number and its unit",
-                )
-        yield number, values
+            raise _diagnose(name, number, text, header)
+        values = np.array([float(cell) for cell in match.groups()]) * self.scales
+        beyond = np.flatnonzero(~(np.abs(values) <= self.bounds))
+        if beyond.size:
+            place = int(beyond[0])
+            raise ProgramError(
+                name,
+                number,
+                match.start(place + 1) + 1,
+                f"{header.names[place]} is beyond the limit of {self.bounds[place] / self.scales[place]:g}",
+                hint="check the number and its unit",
+            )
+        return values
 
 
 def _diagnose(name: str, number: int, line: str, header: Header) -> ProgramError:

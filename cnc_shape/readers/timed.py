@@ -10,7 +10,7 @@ from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import Motion, Program
 from cnc_shape.readers.source import Source
-from cnc_shape.readers.table import TIME, Header, read_rows
+from cnc_shape.readers.table import TIME, Header, Rows, join_rows, read_rows
 from cnc_shape.readers.waypoints import polyline, positions
 from cnc_shape.toolpath import rotary_travel, travel_lengths
 
@@ -28,36 +28,40 @@ class TimedPoints:
     line: IntArray  # (n,)
 
 
-def read_timed_points(source: Source, header: Header) -> TimedPoints:
-    """Read all rows; time counts from the first.
+def read_timed_points(source: Source, header: Header, *, rows: int) -> TimedPoints:
+    """Read all rows, `rows` at a time; time counts from the first.
 
     Raises
     ------
     ProgramError
         As `read_rows`; time that does not go on; fewer than two rows.
     """
-    kept: list[list[float]] = []
-    numbers: list[int] = []
     clock = header.names.index(TIME)
-    for number, values in read_rows(source, header):
-        if kept and values[clock] < kept[-1][clock] + SHORTEST:
-            way = "runs backwards" if values[clock] < kept[-1][clock] else "stands still"
-            raise ProgramError(
-                source.name, number, 1, f"time {way} at {values[clock]:g} s", hint="rows are in order of time"
-            )
-        kept.append(values)
-        numbers.append(number)
-    if len(kept) < 2:
+    parts: list[Rows] = []
+    before = -np.inf
+    for part in read_rows(source, header, rows):
+        time = part.values[:, clock]
+        last = np.concatenate([[before], time[:-1]])
+        wrong = np.flatnonzero(time < last + SHORTEST)
+        if wrong.size:
+            k = int(wrong[0])
+            way = "runs backwards" if time[k] < last[k] else "stands still"
+            reason = f"time {way} at {time[k]:g} s"
+            raise ProgramError(source.name, int(part.line[k]), 1, reason, hint="rows are in order of time")
+        before = time[-1]
+        parts.append(part)
+    if sum(part.line.size for part in parts) < 2:
         raise ProgramError(
             source.name, None, None, "fewer than two rows", hint="a trajectory has two rows at least"
         )
-    table = np.array(kept, dtype=np.float64)
+    table = join_rows(parts)
+    time = table.values[:, clock]
     return TimedPoints(
         source=source.name,
         axes=header.axes,
-        time=frozen(table[:, clock] - table[0, clock]),
-        position=frozen(positions(header, table)),
-        line=frozen_integers(numbers),
+        time=frozen(time - time[0]),
+        position=frozen(positions(header, table.values)),
+        line=table.line,
     )
 
 

@@ -11,7 +11,7 @@ from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import XYZ, Motion, Note, PathMode, Program
 from cnc_shape.readers.source import Source
-from cnc_shape.readers.table import FEED, Header, read_rows
+from cnc_shape.readers.table import FEED, Header, Rows, join_rows, read_rows
 from cnc_shape.toolpath import rotary_travel, travel_lengths
 from cnc_shape.units import DEGREE
 
@@ -69,39 +69,35 @@ def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -
     ProgramError
         As `read_rows`; a feed that is not positive or next to nothing; fewer than two way-points.
     """
-    kept: list[list[float]] = []
-    numbers: list[int] = []
-    first: tuple[int, list[float]] | None = None
     feed = header.names.index(FEED) if FEED in header.names else None
-    note = () if feed is not None else (Note(1, "no column feed_mm_min: the axes go as fast as they can"),)
-    found = handed = 0
-    for number, values in read_rows(source, header):
-        if feed is not None and values[feed] < SLOWEST:
-            reason = f"the feed is below the limit of {SLOWEST:g} mm/s"
-            raise ProgramError(source.name, number, 1, reason, hint="give the feed of the move")
-        first = first or (number, values)
-        kept.append(values)
-        numbers.append(number)
-        found += 1
-        if len(kept) > rows:
-            yield _chunk(source.name, header, kept, numbers, note)
-            kept, numbers, note, handed = kept[-1:], numbers[-1:], (), handed + rows
-    if first is None or found < 2:
+    notes = () if feed is not None else (Note(1, "no column feed_mm_min: the axes go as fast as they can"),)
+    first: Rows | None = None  # the row where the path begins
+    kept: Rows | None = None  # the row where the next chunk begins
+    found = 0
+    for part in read_rows(source, header, rows):
+        if feed is not None:
+            slow = np.flatnonzero(part.values[:, feed] < SLOWEST)
+            if slow.size:
+                reason = f"the feed is below the limit of {SLOWEST:g} mm/s"
+                line = int(part.line[slow[0]])
+                raise ProgramError(source.name, line, 1, reason, hint="give the feed of the move")
+        found += part.line.size
+        here = part if kept is None else join_rows([kept, part])
+        first, kept = first or part.cut(slice(0, 1)), here.cut(slice(-1, None))
+        if here.line.size > 1:
+            yield _chunk(source.name, header, here, notes)
+            notes = ()
+    if first is None or kept is None or found < 2:
         raise ProgramError(
             source.name, None, None, "fewer than two way-points", hint="a path has two points at least"
         )
     if closed:
-        kept.append(first[1])
-        numbers.append(first[0])
-    if len(kept) > 1 or not handed:
-        yield _chunk(source.name, header, kept, numbers, note)
+        yield _chunk(source.name, header, join_rows([kept, first]), notes)
 
 
-def _chunk(
-    source: str, header: Header, rows: list[list[float]], numbers: list[int], notes: tuple[Note, ...]
-) -> Program:
-    table = np.array(rows, dtype=np.float64)
-    program = polyline(source, header.axes, positions(header, table), np.array(numbers, dtype=np.int64))
+def _chunk(source: str, header: Header, rows: Rows, notes: tuple[Note, ...]) -> Program:
+    table = rows.values
+    program = polyline(source, header.axes, positions(header, table), rows.line)
     if FEED not in header.names:
         return replace(program, notes=notes)
     feed = table[1:, header.names.index(FEED)]

@@ -16,19 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cnc_shape import __version__
-from cnc_shape.arrays import FloatArray
-from cnc_shape.errors import InfeasibleError
 from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run
 from cnc_shape.program import ROTARY
-from cnc_shape.recording import Signals
+from cnc_shape.recording import Samples, Signals, require_finite
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
 from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.table import summary_json, tables_csv
 from cnc_shape.shapers import Shaper
 from cnc_shape.units import DEGREE
-from cnc_shape.writers.archive import write_archive
+from cnc_shape.writers.archive import Stream, write_archive
 from cnc_shape.writers.publish import make_folder, publish_folder
 
 RUNS = "cnc-shape-runs"
@@ -122,22 +120,10 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
 
 def _require_finite(signals: Signals) -> None:
     for item in fields(Signals):
-        value = getattr(signals, item.name)
-        if isinstance(value, np.ndarray):
-            _check(signals, item.name, np.asarray(value, dtype=np.float64))
-
-
-def _check(signals: Signals, name: str, values: FloatArray) -> None:
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        row, *column = bad[0].tolist()
-        axis = f" of {signals.axes[column[0]].upper()}" if column else ""
-        settling = name.startswith("settling")
-        value, time = values[row, *column], (signals.settling_time if settling else signals.time)[row]
-        raise InfeasibleError(
-            f"{name}{axis} of the case {signals.case} is {value} at t = {time:.6g} s",
-            hint="the motion ran away: lower the gains of its loop, or check its shapers",
-        )
+        values = getattr(signals, item.name)
+        if isinstance(values, np.ndarray):
+            time = signals.settling_time if item.name.startswith("settling") else signals.time
+            require_finite(item.name, np.asarray(values, np.float64), signals.case, signals.axes, time)
 
 
 def draw(run: Run, context: Context) -> dict[str, Any]:
@@ -153,33 +139,52 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
     return drawn
 
 
-def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any]]:
-    """Arrays of `signals.npz`: time first, the unit in every name; ``<case>/<signal>_<axis>_<unit>``."""
-    arrays: dict[str, NDArray[Any]] = {}
+def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any] | Stream]:
+    """Arrays of `signals.npz`: time first, the unit in every name; ``<case>/<signal>_<axis>_<unit>``.
+
+    They hold every sample, or, of every 8 `decimation` samples, up to 8: see `cnc_shape.recording`.
+    """
+    arrays: dict[str, NDArray[Any] | Stream] = {}
     for case in signals:
         stem = case.case
-        arrays[f"{stem}/time_s"] = case.time
-        for name, values, unit in (
-            ("command", case.command, ""),
-            ("drives", case.position, ""),
-            ("tool", case.tool, ""),
-            ("velocity", case.velocity, "_s"),
-            ("acceleration", case.acceleration, "_s2"),
+        arrays[f"{stem}/time_s"] = _stream(case.source, "time")
+        for name, signal, unit in (
+            ("command", "command", ""),
+            ("drives", "position", ""),
+            ("tool", "tool", ""),
+            ("velocity", "velocity", "_s"),
+            ("acceleration", "acceleration", "_s2"),
         ):
             for k, axis in enumerate(case.axes):
-                rotary = axis in ROTARY
-                scale = 1.0 / DEGREE if rotary else 1.0
-                arrays[f"{stem}/{name}_{axis}_{'deg' if rotary else 'mm'}{unit}"] = values[:, k] * scale
+                scale, length = _unit(axis)
+                arrays[f"{stem}/{name}_{axis}_{length}{unit}"] = _stream(case.source, signal, k, scale)
         arrays[f"{stem}/settling_time_s"] = case.settling_time  # after the end of the motion
         for k, axis in enumerate(case.axes):
-            scale, unit = (1.0 / DEGREE, "deg") if axis in ROTARY else (1.0, "mm")
-            arrays[f"{stem}/settling_{axis}_{unit}"] = case.settling[:, k] * scale
-        arrays[f"{stem}/command_contour_error_mm"] = case.command_error
-        arrays[f"{stem}/contour_error_mm"] = case.drive_error
-        arrays[f"{stem}/tool_contour_error_mm"] = case.tool_error
-        arrays[f"{stem}/line"] = case.line
-        arrays[f"{stem}/decimation"] = np.array([case.factor])
+            scale, length = _unit(axis)
+            arrays[f"{stem}/settling_{axis}_{length}"] = case.settling[:, k] * scale
+        for name, signal in (
+            ("command_contour_error_mm", "command_error"),
+            ("contour_error_mm", "drive_error"),
+            ("tool_contour_error_mm", "tool_error"),
+        ):
+            arrays[f"{stem}/{name}"] = _stream(case.source, signal)
+        arrays[f"{stem}/line"] = _stream(case.source, "line", dtype=np.int64)
+        arrays[f"{stem}/decimation"] = np.array([case.factor if case.samples is None else 1])
     return arrays
+
+
+def _unit(axis: str) -> tuple[float, str]:
+    return (1.0 / DEGREE, "deg") if axis in ROTARY else (1.0, "mm")
+
+
+def _stream(
+    source: Signals | Samples,
+    name: str,
+    axis: int = 0,
+    scale: float = 1.0,
+    dtype: type[np.float64] | type[np.int64] = np.float64,
+) -> Stream:
+    return Stream(len(source), dtype, (piece * scale for piece in source.pieces(name, axis)))
 
 
 def _run_json(context: Context) -> bytes:

@@ -16,7 +16,7 @@ from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run
 from cnc_shape.report.table import columns, micrometres
 from cnc_shape.report.text import one_line
-from cnc_shape.report.words import best_case, price_of_shaping, verdict, worst_places
+from cnc_shape.report.words import Place, best_case, price_of_shaping, verdict, worst_places
 from cnc_shape.shapers import Shaper
 from cnc_shape.shapers.analysis import contour_factor
 
@@ -29,6 +29,7 @@ CAPTIONS = {
     "motion": "Speed and acceleration of the command.",
     "shapers": "Left: the impulses. Right: the vibration a mode keeps where its real frequency is off.",
 }
+FROM_SIGNALS = ("path", "error", "vibration", "motion")  # figures that are drawn from the signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,10 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
     )
     summary, first, best = run.summary, run.summary.cases[0], best_case(run.summary)
     pictures = {
-        name: {"data": base64.b64encode(page.figures[name]).decode(), "caption": caption}
+        name: {
+            "data": base64.b64encode(page.figures[name]).decode(),
+            "caption": caption + (_thinning(run) if name in FROM_SIGNALS else ""),
+        }
         for name, caption in CAPTIONS.items()
         if name in page.figures
     }
@@ -80,7 +84,7 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
             ("Machine", one_line(summary.machine)),
             ("Cycle time", f"{summary.cycle_time:.3f} s"),
             ("Servo period", f"{summary.sample_time * 1e3:g} ms"),
-            ("Samples", f"{summary.samples:,}".replace(",", "\u202f")),
+            ("Samples", _count(summary.samples)),
         ],
         columns=[(column.name, column.unit, column.numbers) for column in columns(summary)],
         rows=[
@@ -99,8 +103,19 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         worst=_place_rows(run, best.name, page.program) if run.signals else [],
         warnings=[one_line(warning) for warning in page.warnings],
         machine=page.machine,
-        factor=max((signals.factor for signals in run.signals), default=1),
+        factor=max((s.factor for s in run.signals if s.samples is None), default=1),
+        bucket=max((s.bucket for s in run.signals if s.samples is None), default=1),
     )
+
+
+def _thinning(run: Run) -> str:
+    """What a caption adds where not every sample is in the figure's reach."""
+    bucket = max((signals.bucket for signals in run.signals), default=1)
+    return f" Drawn from the extremes of every {_count(bucket)} samples." if bucket > 1 else ""
+
+
+def _count(number: int) -> str:
+    return f"{number:,}".replace(",", "\u202f")
 
 
 def _place_rows(run: Run, case: str, program: Path | None) -> list[dict[str, Any]]:
@@ -113,13 +128,20 @@ def _place_rows(run: Run, case: str, program: Path | None) -> list[dict[str, Any
             "numbers": (
                 micrometres(place.error),
                 micrometres(place.drive_error),
-                micrometres(place.first_error),
+                _least(place),
                 f"{place.time:.3f}",
                 *(f"{value:.3f}" for value in place.foot.tolist()),
             ),
         }
         for place in places
     ]
+
+
+def _least(place: Place) -> str:
+    """The first case's error on the line, as far as its samples are there."""
+    if place.first_error is None:
+        return "–"
+    return ("" if place.exact else "≥ ") + micrometres(place.first_error)
 
 
 def _program_lines(program: Path | None, wanted: set[int]) -> dict[int, str]:

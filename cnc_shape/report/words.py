@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cnc_shape.arrays import FloatArray
+from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.pipeline import CaseSummary, Run, Summary
-from cnc_shape.recording import Signals
+from cnc_shape.recording import Samples, Signals
 from cnc_shape.report.table import micrometres, worst_linear
 
 WORST_PLACES = 10
@@ -64,7 +64,8 @@ class Place:
     line: int
     error: float  # mm, of the tool
     drive_error: float  # mm, of the drives at the same time
-    first_error: float  # mm, the largest of the first case on this line, 0 where it has none
+    first_error: float | None  # mm, the largest of the first case on this line; None: it has no sample there
+    exact: bool  # whether every sample of the first case was there to find it
     time: float  # s
     foot: FloatArray  # (3,) mm, on the path
 
@@ -73,31 +74,36 @@ def worst_places(run: Run, case: str) -> list[Place]:
     """The worst places of a case, worst first, some time apart."""
     signals, first = run.signal(case), run.signals[0]
     apart = APART * float(np.ptp(signals.time)) if signals.time.size else 0.0
-    by_line = _worst_by_line(first)
     left = signals.tool_error.copy()
-    places: list[Place] = []
-    while len(places) < WORST_PLACES and left.size and left.max() > 0.0:
+    rows: list[int] = []
+    while len(rows) < WORST_PLACES and left.size and left.max() > 0.0:
         row = int(left.argmax())
-        line = int(signals.line[row])
-        places.append(
-            Place(
-                line,
-                float(signals.tool_error[row]),
-                float(signals.drive_error[row]),
-                by_line.get(line, 0.0),
-                float(signals.time[row]),
-                signals.foot[row],
-            )
-        )
+        rows.append(row)
         left[np.abs(signals.time - signals.time[row]) <= apart] = 0.0
-    return places
+    by_line = _worst_by_line(first.source, signals.line[rows])
+    exact = first.factor == 1 or first.samples is not None
+    return [
+        Place(
+            line=int(signals.line[row]),
+            error=float(signals.tool_error[row]),
+            drive_error=float(signals.drive_error[row]),
+            first_error=by_line.get(int(signals.line[row])),
+            exact=exact,
+            time=float(signals.time[row]),
+            foot=signals.foot[row],
+        )
+        for row in rows
+    ]
 
 
-def _worst_by_line(signals: Signals) -> dict[int, float]:
-    lines, index = np.unique(signals.line, return_inverse=True)
-    worst = np.zeros(lines.size)
-    np.maximum.at(worst, index, signals.tool_error)
-    return dict(zip(lines.tolist(), worst.tolist(), strict=True))
+def _worst_by_line(source: Signals | Samples, lines: IntArray) -> dict[int, float]:
+    """Largest error of the tool on each of `lines` that has samples."""
+    worst: dict[int, float] = {}
+    for line, error in zip(source.pieces("line"), source.pieces("tool_error"), strict=True):
+        wanted = np.isin(line, lines)
+        for number, value in zip(line[wanted].tolist(), error[wanted].tolist(), strict=True):
+            worst[number] = max(worst.get(number, 0.0), value)
+    return worst
 
 
 def _at(line: int | None) -> str:

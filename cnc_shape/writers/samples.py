@@ -26,6 +26,7 @@ from cnc_shape.trajectory import Trajectory
 from cnc_shape.units import DEGREE
 from cnc_shape.writers.archive import NO_TIME
 from cnc_shape.writers.publish import publishing
+from cnc_shape.writers.spool import temporary_refusal
 
 Write = Callable[[bytes], object]
 
@@ -163,11 +164,7 @@ class _Column:
         try:
             self.bytes += self._file.write(np.ascontiguousarray(values).tobytes())
         except OSError as fault:
-            reason = (fault.strerror or str(fault)).lower()
-            raise OutputError(
-                f"cannot write to the folder for temporary files: {reason}",
-                hint="free some space there, or name another folder with TMPDIR",
-            ) from fault
+            raise temporary_refusal(fault) from fault
 
     def copy(self, *sinks: Callable[[bytes], object]) -> None:
         rows = self.bytes // (8 * int(np.prod(self._width, dtype=np.int64)))

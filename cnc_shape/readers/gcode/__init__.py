@@ -7,7 +7,7 @@
 `modal`            what has been set so far
 `settings`         feed, units, offsets, tool: what a block sets
 `motion`, `arcs`   what a block moves
-`plain`            the quick way for straight moves
+`plain`            the compiled way for straight moves
 `printer`          what only 3D printers write
 `rows`             moves to columns
 `interpreter`      the fold over the lines

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from cnc_shape.program import ROTARY, XYZ
-from cnc_shape.readers.source import Source, blocks
+from cnc_shape.readers.source import Source, blocks, count_lines
 
 
 class Dialect(Enum):
@@ -63,13 +63,17 @@ def survey(source: Source, dialect: Dialect | None) -> Survey:
     words_seen, moves_seen = set[str](), set[str]()
     for block in blocks(source):
         head = head or block[: 1 << 16]
-        count += block.count(b"\n") + (not block.endswith(b"\n"))
+        count += count_lines(block)
         words = _COMMENT.sub(b" ", block) if b"(" in block or b";" in block else block
-        printer = printer or _PRINTER_CODES.search(words)
-        setting = setting or _GRBL_SETTING.search(words) is not None
         words = words.upper()
-        words_seen |= {axis for axis in ROTARY if axis not in words_seen and _ROTARY_WORD[axis].search(words)}
-        moves_seen |= {axis for axis in words_seen - moves_seen if _ROTARY_MOVE[axis].search(words)}
+        # a search for one byte is far quicker than one for a pattern, and most answers are no
+        if b"M" in words or b"SET_" in words:
+            printer = printer or _PRINTER_CODES.search(words)
+        if b"$" in words:
+            setting = setting or _GRBL_SETTING.search(words) is not None
+        letters = {axis for axis in ROTARY if axis.upper().encode() in words}
+        words_seen |= {axis for axis in letters - words_seen if _ROTARY_WORD[axis].search(words)}
+        moves_seen |= {axis for axis in letters & words_seen - moves_seen if _ROTARY_MOVE[axis].search(words)}
     if dialect is None:
         dialect, evidence = _judge(head, printer, setting)
     else:

@@ -1,13 +1,14 @@
 """The fold over the lines of a program: each changes the modal state and may add a move.
 
-Most lines of a real program are a straight move with nothing else on them. `take_plain_move` takes those in
-one match; every other line takes the readable way through `read_block`, `settings` and `motion`.
+Most lines of a long program are a straight move with nothing else on them. `take_plain_moves` takes those,
+many at once, from the bytes; every other line takes the readable way through `read_block`, `settings` and
+`motion`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,11 +20,20 @@ from cnc_shape.readers.gcode.blocks import Block, read_block
 from cnc_shape.readers.gcode.dialects import Dialect, Survey
 from cnc_shape.readers.gcode.lexer import BlockError, column_of, compact, diagnose, split_words
 from cnc_shape.readers.gcode.modal import AXES, Modal
-from cnc_shape.readers.gcode.motion import ARCS, dwell, move, row_of
-from cnc_shape.readers.gcode.plain import take_plain_move
+from cnc_shape.readers.gcode.motion import ARCS, dwell, move
+from cnc_shape.readers.gcode.plain import take_plain_moves
 from cnc_shape.readers.gcode.rows import Rows, to_program
 from cnc_shape.readers.gcode.settings import apply_after, apply_before
-from cnc_shape.readers.source import ReadingLimits, Source, lines
+from cnc_shape.readers.source import (
+    CHUNK_ROWS,
+    COMPILED_FROM,
+    Bytes,
+    Source,
+    as_bytes,
+    blocks,
+    line_at,
+    text_of,
+)
 from cnc_shape.tools import Tool
 
 _LEFT_OVER = frozenset("NFSTO")
@@ -36,16 +46,15 @@ class GcodeOptions:
     dialect: Dialect | None = None  # None: decided on evidence
     block_delete: bool = False  # lines that start with / are skipped
     tools: tuple[Tool, ...] = ()
-    rows: int = 16384  # of a chunk
-    plain_moves: bool = True  # take the quick way where it exists; the answer is the same
-    limits: ReadingLimits = field(default_factory=ReadingLimits)
+    compiled_from: int = COMPILED_FROM  # bytes: in longer texts, plain lines take the compiled way
 
 
 class Interpreter:
     """A program being read: the modal state, and the rows that were not handed on yet."""
 
-    def __init__(self, source: str, survey: Survey, options: GcodeOptions) -> None:
-        self.source = source
+    def __init__(self, source: Source, survey: Survey, options: GcodeOptions) -> None:
+        self.source = source.name
+        self.limits = source.limits
         self.survey = survey
         self.dialect = survey.dialect
         self.options = options
@@ -70,8 +79,35 @@ class Interpreter:
         self.rows, self.start = Rows(), chunk.end
         return chunk
 
+    def take_plain_lines(self, text: Bytes, at: int, rows: int) -> int:
+        """Carry out plain lines of `text` from `at` on in the compiled way; return where it stopped."""
+        limits = self.limits
+        taken = take_plain_moves(
+            text, at, self.line, self.modal, self.rows, self.dialect,
+            most_rows=rows, blocks=limits.blocks - self.blocks, limits=limits,
+        )  # fmt: skip
+        self.line += taken.lines
+        self.blocks += taken.blocks
+        return taken.at
+
+    def take_line(self, line: bytes) -> None:
+        """Carry out the next line in the readable way.
+
+        Raises
+        ------
+        ProgramError
+            With the line and the column.
+        """
+        self.line += 1
+        text = text_of(self.source, self.line, line, self.limits)
+        try:
+            self.execute(text)
+        except BlockError as error:
+            column = error.column if error.column is not None else column_of(text, error.letter)
+            raise ProgramError(self.source, self.line, column or 1, error.reason, hint=error.hint) from None
+
     def execute(self, line: str) -> None:
-        """Carry out one line in the readable way."""
+        """Carry out the text of a line."""
         if self.dialect is Dialect.MARLIN and printer.is_ignored(line, self.remark):
             return
         text = compact(line)
@@ -103,9 +139,9 @@ class Interpreter:
     def count(self) -> None:
         """Count an executed block, up to the limit."""
         self.blocks += 1
-        if self.blocks > self.options.limits.blocks:
+        if self.blocks > self.limits.blocks:
             raise BlockError(
-                f"more blocks were executed than the limit of {self.options.limits.blocks}",
+                f"more blocks were executed than the limit of {self.limits.blocks}",
                 hint="raise the limit of the executed blocks, or split the program",
                 column=1,
             )
@@ -124,7 +160,7 @@ class Interpreter:
             modal.position = [0.0 if axis in home else value for axis, value in enumerate(modal.position)]
             modal.g92 = [0.0 if axis in home else value for axis, value in enumerate(modal.g92)]
             modal.update_offset()
-            self.rows.rows.append(row_of(Motion.RAPID, self.line, modal))
+            self.rows.add(Motion.RAPID, self.line, modal)
             return True
         if printer.zeroes_all(text):
             modal.g92 = list(modal.position)
@@ -145,7 +181,7 @@ class Interpreter:
         apply_before(block, modal, self.remark)
         if non_modal == codes.DWELL:
             pause = pause if printer_dwell else dwell(block, self.dialect)
-            self.rows.rows.append(row_of(Motion.DWELL, self.line, modal, dwell=pause))
+            self.rows.add(Motion.DWELL, self.line, modal, dwell=pause)
         if non_modal == codes.SET_POSITION and self.dialect is Dialect.MARLIN:
             words.pop("E", None)  # counts filament
             if not set(AXES) & set(words):
@@ -155,7 +191,7 @@ class Interpreter:
             words.pop("E", None)
             self.remark("G187", "G187 is ignored: the path tolerance is the machine's")
         apply_after(block, modal, self.tools, self.remark)
-        move(block, self.line, modal, self.rows, self.dialect, self.options.limits)
+        move(block, self.line, modal, self.rows, self.dialect, self.limits)
         left = set(words) - _LEFT_OVER
         if self.dialect is Dialect.MARLIN:
             left -= {"E"}
@@ -207,33 +243,33 @@ def _one_owner(block: Block, modal: Modal) -> None:
         raise BlockError("two codes use the P of this line", hint="write two lines", letter="P")
 
 
-def interpret(source: Source, survey: Survey, options: GcodeOptions) -> Iterator[Program]:
-    """Yield the program in chunks of at least ``options.rows`` rows; the last holds the rest.
+def interpret(
+    source: Source, survey: Survey, options: GcodeOptions, rows: int = CHUNK_ROWS
+) -> Iterator[Program]:
+    """Yield the program in chunks of at least `rows` rows; the last holds the rest.
 
     Raises
     ------
     ProgramError
         At the first thing that is wrong, with its line and column.
     """
-    machine = Interpreter(source.name, survey, options)
-    printer_rules, limit, quick = (
-        survey.dialect is Dialect.MARLIN,
-        options.limits.coordinate,
-        options.plain_moves,
-    )
-    for number, line in lines(source):
-        machine.line = number
-        try:
-            if quick and take_plain_move(line, number, machine.modal, machine.rows, printer_rules, limit):
-                machine.count()
-            else:
-                machine.execute(line)
-        except BlockError as error:
-            column = error.column if error.column is not None else column_of(line, error.letter)
-            raise ProgramError(source.name, number, column or 1, error.reason, hint=error.hint) from None
+    machine = Interpreter(source, survey, options)
+    compiled = source.size >= options.compiled_from
+    for block in blocks(source):
+        text = as_bytes(block)
+        at = 0
+        while at < len(block):
+            if compiled:
+                at = machine.take_plain_lines(text, at, rows)
+            if at < len(block) and len(machine.rows) < rows:
+                line = line_at(block, at)
+                machine.take_line(line)
+                at += len(line) + 1
+            if machine.ended:
+                break
+            if len(machine.rows) >= rows:
+                yield machine.hand_on()
         if machine.ended:
             break
-        if len(machine.rows.rows) >= options.rows:
-            yield machine.hand_on()
     machine.finish()
     yield machine.hand_on()

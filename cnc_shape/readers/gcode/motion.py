@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf
-
 from cnc_shape.program import Motion
 from cnc_shape.readers.gcode import codes
 from cnc_shape.readers.gcode.arcs import (
@@ -20,7 +18,7 @@ from cnc_shape.readers.gcode.blocks import Block
 from cnc_shape.readers.gcode.dialects import Dialect
 from cnc_shape.readers.gcode.lexer import BlockError
 from cnc_shape.readers.gcode.modal import AXES, Modal
-from cnc_shape.readers.gcode.rows import PER_LENGTH, PER_TIME, Row, Rows
+from cnc_shape.readers.gcode.rows import AS_FAST_AS_THE_AXES_CAN, Feed, Rows
 from cnc_shape.readers.gcode.settings import take_axes, whole
 from cnc_shape.readers.source import ReadingLimits
 from cnc_shape.units import MILLISECOND, PER_MIN
@@ -28,22 +26,6 @@ from cnc_shape.units import MILLISECOND, PER_MIN
 _ARC_WORDS = "IJKR"
 _ZERO_NORMAL = (Dialect.GRBL, Dialect.MARLIN)  # take a centre offset of 0 along the plane's normal
 ARCS = (codes.ARC_CW, codes.ARC_CCW)
-
-
-def row_of(
-    motion: Motion,
-    line: int,
-    modal: Modal,
-    *,
-    feed: tuple[float, float, float] = (inf, inf, PER_TIME),
-    dwell: float = 0.0,
-) -> Row:
-    """Return a row that ends at the present position."""
-    x, y, z, a, b, c = modal.position
-    return (
-        motion, line, x, y, z, a, b, c, *feed, dwell,
-        modal.path_mode, modal.path_tolerance, modal.merge_tolerance,
-    )  # fmt: skip
 
 
 def dwell(block: Block, dialect: Dialect) -> float:
@@ -91,7 +73,7 @@ def move(block: Block, line: int, modal: Modal, rows: Rows, dialect: Dialect, li
         return
     modal.position = end
     kind = Motion.RAPID if motion == codes.RAPID else Motion.FEED
-    rows.rows.append(row_of(kind, line, modal, feed=_feed(block, modal, kind, dialect)))
+    rows.add(kind, line, modal, feed=_feed(block, modal, kind, dialect))
 
 
 def _targets(
@@ -118,20 +100,19 @@ def check_coordinate(value: float, letter: str, limits: ReadingLimits) -> None:
         )
 
 
-def _feed(block: Block, modal: Modal, kind: Motion, dialect: Dialect) -> tuple[float, float, float]:
-    """Feed along XYZ in mm/s, about rotary axes in deg/s, and what the numbers mean."""
+def _feed(block: Block, modal: Modal, kind: Motion, dialect: Dialect) -> Feed:
     mode = modal.feed_mode
     if kind is Motion.RAPID:
         if dialect is Dialect.MARLIN and modal.feed > 0.0:
-            return modal.feed * PER_MIN, modal.feed_angular * PER_MIN, PER_TIME
-        return inf, inf, PER_TIME
+            return Feed(modal.feed * PER_MIN, modal.feed_angular * PER_MIN)
+        return AS_FAST_AS_THE_AXES_CAN
     name = "G1" if kind is Motion.FEED else "an arc"
     if mode == codes.INVERSE_TIME:
         if block.words.get("F", 0.0) == 0.0:
             raise BlockError(
                 f"{name} under G93 needs its own F", hint="F is 1 / minutes of the move", letter="G1"
             )
-        return modal.feed * PER_MIN, modal.feed * PER_MIN, PER_LENGTH
+        return Feed(modal.feed * PER_MIN, modal.feed * PER_MIN, per_move=True)
     if modal.feed == 0.0:
         raise BlockError(f"{name} without a feed", hint="give F before it or with it", letter="G1")
     if mode == codes.PER_REVOLUTION:
@@ -140,8 +121,8 @@ def _feed(block: Block, modal: Modal, kind: Motion, dialect: Dialect) -> tuple[f
                 "feed per revolution (G95) with the spindle speed 0: no motion", hint="give S", letter="G1"
             )
         per_second = modal.spindle_speed * PER_MIN
-        return modal.feed * per_second, modal.feed_angular * per_second, PER_TIME
-    return modal.feed * PER_MIN, modal.feed_angular * PER_MIN, PER_TIME
+        return Feed(modal.feed * per_second, modal.feed_angular * per_second)
+    return Feed(modal.feed * PER_MIN, modal.feed_angular * PER_MIN)
 
 
 def _arc(
@@ -161,8 +142,8 @@ def _arc(
     center = [0.0, 0.0, 0.0]
     center[first], center[second], center[normal] = *geometry.center, start[normal]
     modal.position = end
-    row = row_of(Motion.ARC, line, modal, feed=_feed(block, modal, Motion.ARC, dialect))
-    rows.add_arc(row, (center[0], center[1], center[2]), NORMALS[modal.plane], geometry.sweep)
+    feed = _feed(block, modal, Motion.ARC, dialect)
+    rows.add_arc(line, modal, feed, (center[0], center[1], center[2]), NORMALS[modal.plane], geometry.sweep)
 
 
 def _arc_geometry(

@@ -1,89 +1,128 @@
-"""The quick way: a line that is one straight move and nothing else, in one match."""
+"""The compiled way for plain lines: most lines of a long program are a straight move and nothing else.
+
+The bytes go to the kernel `plain_moves`, which stops at the first line that is more than that; it changes
+what the readable way would change. Tests hold the two ways equal.
+"""
 
 from __future__ import annotations
 
-import re
-from math import inf
+from functools import cache
+from typing import NamedTuple
 
-from cnc_shape.program import Motion
-from cnc_shape.readers.gcode.codes import FEED, PER_MINUTE, RAPID
-from cnc_shape.readers.gcode.modal import Modal
-from cnc_shape.readers.gcode.rows import PER_TIME, Rows
+import numpy as np
+
+from cnc_shape.readers.gcode.blocks import LARGEST
+from cnc_shape.readers.gcode.codes import FEED, INVERSE_TIME, PER_REVOLUTION, RAPID
+from cnc_shape.readers.gcode.dialects import Dialect
+from cnc_shape.readers.gcode.modal import AXES, Modal
+from cnc_shape.readers.gcode.rows import Rows
 from cnc_shape.readers.gcode.settings import SLOWEST
+from cnc_shape.readers.source import Bytes, ReadingLimits
 from cnc_shape.units import PER_MIN
 
-_NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))"
-_PLAIN_MOVE = re.compile(
-    rf"(?:G0?([01]))?(?:F([0-9]+\.?[0-9]*))?(?:X{_NUMBER})?(?:Y{_NUMBER})?(?:Z{_NUMBER})?(?:A{_NUMBER})?"
-    rf"(?:E{_NUMBER})?(?:F([0-9]+\.?[0-9]*))?"
-)
-_RAPID, _FEED = int(Motion.RAPID), int(Motion.FEED)
+_WORDS = AXES + "GFSEN"  # in the kernel's order
 
 
-def take_plain_move(line: str, number: int, modal: Modal, rows: Rows, printer: bool, limit: float) -> bool:
-    """Carry out `line` if it is a plain straight move; otherwise leave everything as it is.
+class Modes(NamedTuple):
+    """What holds for a stretch of plain lines."""
+
+    absolute: bool
+    per_move: bool  # F is moves per minute
+    printer: bool  # E words are filament, and G0 runs at its F
+    millimetres: float  # per programmed length unit
+    per_second: float  # of what is programmed per minute
+    coordinate: float  # limit of the coordinates, mm and degrees
+    slowest: float  # smallest F
+    largest: float  # limit of all numbers
+    line_bytes: int
+    path_mode: int
+    path_tolerance: float  # mm
+    merge_tolerance: float  # mm
+
+
+class Taken(NamedTuple):
+    """How far the compiled way came."""
+
+    at: int  # first byte of the line that was not taken
+    lines: int
+    blocks: int  # lines with words
+
+
+@cache
+def _roles() -> Bytes:
+    """What each byte is to the kernel, (256,)."""
+    from cnc_shape.kernels import plain_moves as kernel
+
+    roles = np.full(256, kernel.FOREIGN, dtype=np.uint8)
+    roles[[ord(" "), ord("\t")]] = kernel.BLANK
+    roles[ord(";")], roles[ord("(")] = kernel.REMARK, kernel.OPENING
+    for word, letter in enumerate(_WORDS):
+        roles[[ord(letter), ord(letter.lower())]] = kernel.FIRST_WORD + word
+    return roles
+
+
+def take_plain_moves(
+    text: Bytes,
+    at: int,
+    line: int,
+    modal: Modal,
+    rows: Rows,
+    dialect: Dialect,
+    *,
+    most_rows: int,
+    blocks: int,
+    limits: ReadingLimits,
+) -> Taken:
+    """Take the plain lines that come next; stop at the first that is not, or when there is no more room.
 
     Parameters
     ----------
-    line, number
-        The text as it stands in the file, and its number.
+    text, at
+        Whole lines of the program, and where to begin.
+    line
+        Lines before `at`.
     modal, rows
-        Updated if the answer is true.
-    printer
-        Whether E words are allowed and G0 runs at its F.
-    limit
-        Of the coordinates, mm and degrees.
+        Updated.
+    dialect
+        Whose rules hold.
+    most_rows
+        That `rows` shall hold.
+    blocks
+        The most lines with words.
+    limits
+        Of coordinates and line length.
     """
-    match = _PLAIN_MOVE.fullmatch(line.replace(" ", ""))
-    if match is None or not modal.absolute or modal.feed_mode != PER_MINUTE or modal.diameter:
-        return False
-    code, early_feed, x, y, z, a, e, late_feed = match.groups()
-    motion = modal.motion if code is None else RAPID if code == "0" else FEED
-    if (motion != FEED and motion != RAPID) or (e is not None and not printer):
-        return False
-    scale, offset = modal.millimetres, modal.offset
-    feed, angular = modal.feed, modal.feed_angular
-    if early_feed is not None or late_feed is not None:
-        if early_feed is not None and late_feed is not None:
-            return False
-        angular = float(early_feed or late_feed)  # pyright: ignore[reportArgumentType]  # one of them is there
-        feed = angular * scale
-        if not SLOWEST <= angular < limit:
-            return False
-    if x is None and y is None and z is None and a is None and e is None:
-        return False
-    if motion == FEED and feed == 0.0:
-        return False
-    end = modal.position.copy()
-    if x is not None:
-        end[0] = float(x) * scale + offset[0]
-    if y is not None:
-        end[1] = float(y) * scale + offset[1]
-    if z is not None:
-        end[2] = float(z) * scale + offset[2]
-    if a is not None:
-        end[3] = float(a) + offset[3]
-    if max(end) > limit or min(end) < -limit:
-        return False
-    modal.motion, modal.feed, modal.feed_angular, modal.position = motion, feed, angular, end
-    fast = motion == RAPID and not (printer and feed > 0.0)
-    rows.rows.append(
-        (
-            _RAPID if motion == RAPID else _FEED,
-            number,
-            end[0],
-            end[1],
-            end[2],
-            end[3],
-            end[4],
-            end[5],
-            inf if fast else feed * PER_MIN,
-            inf if fast else angular * PER_MIN,
-            PER_TIME,
-            0.0,
-            modal.path_mode,
-            modal.path_tolerance,
-            modal.merge_tolerance,
-        )
+    if modal.feed_mode == PER_REVOLUTION or modal.diameter:
+        return Taken(at, 0, 0)
+    from cnc_shape.kernels import plain_moves as kernel
+
+    motions = {None: kernel.NO_MOTION, RAPID: kernel.RAPID, FEED: kernel.STRAIGHT}
+    registers = np.array(
+        [motions.get(modal.motion, kernel.CURVED), modal.feed, modal.feed_angular, modal.spindle_speed]
     )
-    return True
+    position = np.array(modal.position)
+    modes = Modes(
+        absolute=modal.absolute,
+        per_move=modal.feed_mode == INVERSE_TIME,
+        printer=dialect is Dialect.MARLIN,
+        millimetres=modal.millimetres,
+        per_second=PER_MIN,
+        coordinate=float(limits.coordinate),
+        slowest=SLOWEST,
+        largest=LARGEST,
+        line_bytes=limits.line_bytes,
+        path_mode=int(modal.path_mode),
+        path_tolerance=modal.path_tolerance,
+        merge_tolerance=modal.merge_tolerance,
+    )
+    room = min(most_rows, rows.make_room())
+    end, lines, rows.count, executed = kernel.plain_moves(
+        text, at, line, _roles(), modes, registers, position, np.array(modal.offset), rows.columns,
+        rows.count, room, blocks,
+    )  # fmt: skip
+    if lines:
+        motion, modal.feed, modal.feed_angular, modal.spindle_speed = registers.tolist()
+        modal.position = position.tolist()
+        if motion != kernel.CURVED:
+            modal.motion = {kernel.NO_MOTION: None, kernel.RAPID: RAPID, kernel.STRAIGHT: FEED}[motion]
+    return Taken(end, lines, executed)

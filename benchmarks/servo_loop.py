@@ -1,0 +1,91 @@
+"""The cross-coupled servo loop of three axes, step by step, against the same loop in pure Python."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from functools import partial
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from benchmarks.measuring import Kind, Row, best_of, not_built, report
+from benchmarks.motions import LIMITS, SAMPLE_TIME, command
+from cnc_shape.controllers import Control, CrossCoupling, Feedforward
+from cnc_shape.machine import Axis, FirstOrderLag, Machine
+from cnc_shape.plant import discretise
+from cnc_shape.simulation import simulating
+from cnc_shape.trajectory import BLOCK, Trajectory
+
+BLOCKS = 50_000
+STEPS = 20_000  # of the loop in Python
+ROUNDS = 5
+DRIVES = ((0.0153, 0.9930), (0.0142, 0.9982), (0.0150, 1.0))  # time constant in s, gain
+MACHINE = Machine(
+    "lag drives",
+    tuple(
+        Axis(name, limits, FirstOrderLag(*drive))
+        for name, limits, drive in zip("xyz", LIMITS, DRIVES, strict=True)
+    ),
+)
+GAIN, COUPLING = 20.0, 80.0  # 1/s
+CONTROL = Control(SAMPLE_TIME, GAIN, 0, Feedforward(1.0, 1.0), CrossCoupling(COUPLING))
+Vector = list[float]
+
+
+def loop_in_python(position: list[Vector], velocity: list[Vector]) -> list[Vector]:
+    """Positions of the drives under a command; every step adds up the same terms as the compiled loop."""
+    plant = discretise(MACHINE.axes, SAMPLE_TIME)
+    ahead = plant.transition[:, 0, 1].tolist()  # position from velocity
+    decay = plant.transition[:, 1, 1].tolist()
+    push, pull = plant.held[:, 0].tolist(), plant.held[:, 1].tolist()  # position, velocity from drive
+    forward = [1.0 / gain for _, gain in DRIVES]
+    inverse = [tau / gain for tau, gain in DRIVES]
+    q, speed, tangent = list(position[0]), [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    found: list[Vector] = []
+    for k in range(len(position) - 1):
+        found.append(list(q))
+        now, then, v, w = position[k], position[k + 1], velocity[k], velocity[k + 1]
+        following = [now[0] - q[0], now[1] - q[1], now[2] - q[2]]
+        norm = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        if norm > 0.0:
+            tangent = [v[0] / norm, v[1] / norm, v[2] / norm]
+        along = following[0] * tangent[0] + following[1] * tangent[1] + following[2] * tangent[2]
+        for i in range(3):
+            drive = GAIN * following[i]
+            drive += forward[i] * (then[i] - now[i]) / SAMPLE_TIME + inverse[i] * (w[i] - v[i]) / SAMPLE_TIME
+            drive += COUPLING * (following[i] - along * tangent[i])
+            q[i] += ahead[i] * speed[i] + push[i] * drive
+            speed[i] = decay[i] * speed[i] + pull[i] * drive
+    return found
+
+
+def rows() -> Iterator[Row]:
+    """Measure."""
+    motion = command("printer", BLOCKS)
+    short: Trajectory = motion.cut(slice(0, STEPS + 1))
+    position, velocity = short.position.tolist(), short.velocity.tolist()
+    step = simulating(MACHINE, CONTROL)  # what is prepared once is not of a step
+    blocks = [motion.cut(slice(first, first + BLOCK)) for first in range(0, len(motion), BLOCK)]
+
+    def run() -> None:
+        state = None
+        for block in blocks:
+            state, _ = step(state, block, block is blocks[-1])
+
+    _, response = step(None, motion, True)
+    assert np.allclose(response.position[:STEPS], loop_in_python(position, velocity), atol=1e-9)
+    ours = best_of(ROUNDS, run) / len(motion)
+    peer = best_of(2, partial(loop_in_python, position, velocity)) / STEPS
+    stage, unit = "cross-coupled loop, 3 axes", "ns/step"
+    yield Row(stage, Kind.SPEED_UP, 100.0, "pure Python", unit, ours * 1e9, peer * 1e9)
+    stage = "cross-coupled loop, 6 axes, Jacobian each step"
+    yield not_built(stage, Kind.SHARE, 0.5, "numpy.linalg.solve")
+    yield not_built("observer and adaptation", Kind.SHARE, 2.0, "compiled prototype (recorded)")
+
+
+if __name__ == "__main__":
+    report(rows())

@@ -1,0 +1,40 @@
+"""The whole chain: 200 k lines of a printer's program, one case shaped and simulated, no report.
+
+Processor time of the whole process with warm kernels. The peer plans the same number of lines and stops
+there: no servo, no structure, no contour error. It cannot be installed from a package index, so its
+number is recorded.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from benchmarks.measuring import CNC_SHAPE, Kind, Row, best_child, child, report, workshop, written
+
+LINES = 200_000
+ROUNDS = 3
+KLIPPER = 4.6  # s of processor time for as many lines, 250 times real time
+
+
+def rows() -> Iterator[Row]:
+    """Measure."""
+    with workshop() as folder:
+        path = written("printer", LINES, folder)
+        warm = written("printer", 100, folder)
+        command = [*CNC_SHAPE, "simulate", "--json", "--cases", "shaped"]
+        child([*command, str(warm)], folder)
+        used = best_child(ROUNDS, [*command, str(path)], folder)
+        motion = json.loads(used.output)["cycle_time_s"]
+        stage = "whole chain, 200 k lines, one case"
+        note = "Klipper's number is recorded, on another program of as many lines"
+        yield Row(stage, Kind.SHARE, 0.5, "Klipper (recorded)", "s", used.cpu, KLIPPER, note)
+        yield Row(stage, Kind.SPEED_UP, 500.0, "the motion itself", "s", used.cpu, motion)
+
+
+if __name__ == "__main__":
+    report(rows())
