@@ -7,11 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels.arcs import quadrature_lengths
-from cnc_shape.program import Motion
+from cnc_shape.kernels.layout import lay_out
 from cnc_shape.toolpath import Toolpath
-
-BOX_MARGIN = 1e-9  # mm, more than the rounding of coordinates below 1e6 mm
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,26 +34,12 @@ NO_SEGMENTS = Segments(
 
 def segments(toolpath: Toolpath, *, first: bool) -> Segments:
     """Lay out a chunk of a toolpath; `first`: it begins the path, so its first row is kept in any case."""
-    low, high = toolpath.arc_length[:-1], toolpath.arc_length[1:]
-    wanted = high > low
-    if first and wanted.size:
-        wanted[0] = True
-    keep = np.flatnonzero(wanted)
-    start, end = toolpath.start[keep, :3], toolpath.end[keep, :3]
-    low, high = low[keep], high[keep]
-    is_arc = (toolpath.kind[keep] == Motion.ARC) & (high > low) & (toolpath.sweep[keep] != 0.0)
-    rows = keep[is_arc]
-    arc = np.full(keep.size, -1)
-    arc[is_arc] = np.arange(rows.size)
-    arcs = _arcs(
-        start[is_arc], end[is_arc], toolpath.center[rows], toolpath.normal[rows], toolpath.sweep[rows],
-        high[is_arc] - low[is_arc],
+    start, end, low, high, line, arc, arcs, boxes = lay_out(
+        toolpath.kind, toolpath.start, toolpath.end, toolpath.center, toolpath.normal, toolpath.sweep,
+        toolpath.arc_length, toolpath.line, first,
     )  # fmt: skip
-    boxes = np.hstack([np.minimum(start, end), np.maximum(start, end)])
-    boxes[is_arc] = _arc_boxes(start[is_arc], end[is_arc], arcs)
-    boxes += np.repeat([-BOX_MARGIN, BOX_MARGIN], 3)
     return Segments(
-        frozen(start), frozen(end), frozen(low), frozen(high), frozen_integers(toolpath.line[keep]),
+        frozen(start), frozen(end), frozen(low), frozen(high), frozen_integers(line),
         frozen_integers(arc), frozen(arcs), frozen(boxes),
     )  # fmt: skip
 
@@ -91,48 +74,3 @@ def since(path: Segments, place: float) -> Segments:
         frozen_integers(path.line[drop:]), frozen_integers(np.where(kept >= 0, kept - gone, -1)),
         frozen(path.arcs[gone:]), frozen(path.boxes[drop:]),
     )  # fmt: skip
-
-
-def _arcs(
-    start: FloatArray,
-    end: FloatArray,
-    center: FloatArray,
-    normal: FloatArray,
-    sweep: FloatArray,
-    length: FloatArray,
-) -> FloatArray:
-    """Table of arcs, (a,17), from their programmed form."""
-    angle = np.abs(sweep)
-    rise = ((end - start) * normal).sum(axis=1)
-    arm, end_arm = start - center, end - center - rise[:, None] * normal
-    radius = np.sqrt((arm * arm).sum(axis=1))
-    end_radius = np.sqrt((end_arm * end_arm).sum(axis=1))
-    # a spiral out of its center has no direction at its start: turn that of its end back
-    back = np.cos(sweep)[:, None] * end_arm - np.sin(sweep)[:, None] * np.cross(normal, end_arm)
-    outward = frozen(np.where((radius > 0.0)[:, None], arm, back))
-    first = outward / np.sqrt((outward * outward).sum(axis=1))[:, None]
-    second = np.cross(normal, first) * np.sign(sweep)[:, None]
-    growth = (end_radius - radius) / angle
-    # rounding of the end point is no spiral
-    growth = np.where(np.abs(growth * angle) <= 1e-12 * radius, 0.0, growth)
-    climb = np.where(np.abs(rise) <= 1e-12 * radius, 0.0, rise / angle)
-    table = np.column_stack([center, first, second, normal, radius, growth, climb, angle])
-    ratio = length / quadrature_lengths(radius, growth, climb, angle)
-    return frozen(np.column_stack([table, ratio]))
-
-
-def _arc_boxes(start: FloatArray, end: FloatArray, arcs: FloatArray) -> FloatArray:
-    """Boxes around balls that hold the arcs, (a,6).
-
-    Up to half a turn an arc or helix lies in the ball over its chord (Thales), a spiral within the change
-    of its radius of it; beyond, it lies in the ball about the middle of its axis.
-    """
-    center, normal = arcs[:, :3], arcs[:, 9:12]
-    radius, growth, climb, angle = arcs[:, 12], arcs[:, 13], arcs[:, 14], arcs[:, 15]
-    change = np.abs(growth) * angle
-    half_rise = 0.5 * climb * angle
-    chord = np.sqrt(((end - start) ** 2).sum(axis=1))
-    short = angle <= np.pi
-    middle = np.where(short[:, None], 0.5 * (start + end), center + half_rise[:, None] * normal)
-    ball = np.where(short, 0.5 * chord + change, np.hypot(radius + change, half_rise))
-    return frozen(np.hstack([middle - ball[:, None], middle + ball[:, None]]))

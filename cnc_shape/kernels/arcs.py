@@ -24,8 +24,6 @@ Seen from a point at radius rho, angle theta and height z about the arc's axis, 
 
 from math import atan2, ceil, cos, floor, inf, pi, sin, sqrt
 
-import numpy as np
-
 from cnc_shape.kernels import kernel
 
 TWO_PI = 2.0 * pi
@@ -36,12 +34,18 @@ NODE_2, WEIGHT_2 = 0.3399810435848563, 0.6521451548625461
 
 
 @kernel
-def reach(d_v2):
-    """Square of a distance a little above sqrt(d_v2), mm^2: beyond it, no rounding makes anything nearer.
+def beyond(d_v2):
+    """A distance a little above sqrt(d_v2), mm: farther away, no rounding makes anything nearer.
 
     Coordinates are below 1e6 mm, so distances are rounded by less than 1e-9 mm.
     """
-    return (sqrt(d_v2) * (1.0 + 1e-12) + 1e-9) ** 2
+    return sqrt(d_v2) * (1.0 + 1e-12) + 1e-9
+
+
+@kernel
+def reach(d_v2):
+    """Square of `beyond`, mm^2."""
+    return beyond(d_v2) ** 2
 
 
 @kernel
@@ -223,10 +227,7 @@ def nearest_on_spiral(radius, g, h, rho, theta, z, low, high, reach_v2):
     every arc but the tightest, so that one Newton search finds its only minimum; what is left of the
     turn is mostly out of reach at once. `search_piece` settles all others.
     """
-    best, best_angle = squared_distance(radius, g, h, rho, theta, z, low), low
-    d_v2 = squared_distance(radius, g, h, rho, theta, z, high)
-    if d_v2 < best:
-        best, best_angle = d_v2, high
+    best, best_angle = inf, low
     convex = min(radius + g * low, radius + g * high) > 4.0 * abs(g)
     turn_low = ceil((low - theta - CORE) / TWO_PI)
     turn_high = floor((high - theta + CORE) / TWO_PI)
@@ -244,6 +245,14 @@ def nearest_on_spiral(radius, g, h, rho, theta, z, low, high, reach_v2):
                     best, best_angle = d_v2, angle
         else:
             best, best_angle = search_piece(radius, g, h, rho, theta, z, a, b, best, best_angle, reach_v2)
+    for end in (low, high):
+        away = nearest_turn(end - theta, end - theta) / pi
+        limit = min(reach_v2, reach(best))
+        r, rise = radius + g * end, z - h * end
+        if (r - rho) ** 2 + 4.0 * r * rho * away * away + rise * rise <= limit:  # sin(psi/2) >= psi / pi
+            d_v2 = squared_distance(radius, g, h, rho, theta, z, end)
+            if d_v2 < best or (d_v2 == best and end < best_angle):
+                best, best_angle = d_v2, end
     for turn in range(turn_low - 1, turn_high + 1):
         a = max(low, theta + TWO_PI * turn + CORE)
         b = min(high, theta + TWO_PI * (turn + 1) - CORE)
@@ -280,12 +289,3 @@ def nearest_on_arc(arcs, j, px, py, pz, low, high, reach_v2):
     if g == 0.0 and h == 0.0:
         return nearest_on_circle(radius, rho, theta, z, low, high)
     return nearest_on_spiral(radius, g, h, rho, theta, z, low, high, reach_v2)
-
-
-@kernel
-def quadrature_lengths(radius, g, h, angle):
-    """Lengths of whole arcs, mm; all (a,)."""
-    out = np.empty(radius.size)
-    for j in range(radius.size):
-        out[j] = quadrature(radius[j], g[j], h[j], angle[j])
-    return out
