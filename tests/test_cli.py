@@ -34,7 +34,7 @@ def python(code: str, *arguments: str, **environment: str) -> subprocess.Complet
         text=True,
         cwd=ROOT,
         env={**os.environ, **environment},
-        timeout=60,
+        timeout=300,  # the first run compiles
         check=False,
     )
 
