@@ -43,6 +43,18 @@ def test_a_polygon_about_an_arc_is_tangent_at_its_ends_and_outside_by_a_quarter(
     assert_allclose(edges.travel.sum(), radius * abs(sweep), rtol=1e-12)
 
 
+@pytest.mark.parametrize("radius", [0.05, 1.0, 30.0])
+@pytest.mark.parametrize("sweep", [0.3, -2.0, 15.0])
+@pytest.mark.parametrize("rise", [0.0, 0.01, -4.0])
+def test_corners_of_a_polygon_are_where_the_tangents_meet(radius, sweep, rise):
+    end = (radius * np.cos(sweep), radius * np.sin(sweep), rise)
+    edges = straighten(toolpath(arc(end, (0.0, 0.0, 0.0), sweep), start=(radius, 0.0, 0.0)))
+    corners = naive.tangent_polygon(radius, rise, sweep, len(edges) - 1)
+    assert_allclose(edges.start[1:-1], corners, atol=1e-11)
+    circle = np.pi * 2 / (abs(sweep) / (len(edges) - 2))  # as few as the share of the tolerance allows
+    assert rise or circle <= max(18.0, np.pi / np.sqrt(2 * 0.01 / 12 / radius)) * (1 + 2.0 / (len(edges) - 2))
+
+
 @settings(max_examples=60)
 @given(
     radius=st.sampled_from([0.05, 2.0, 40.0]),
