@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, toolpath
 
 from cnc_shape.kernels.chords import WINDOW
-from cnc_shape.kernels.polyline import EXACT_PATH_TOLERANCE
+from cnc_shape.kernels.polyline import EXACT_PATH_TOLERANCE, LARGEST_STEP
 from cnc_shape.polyline import Merging, Polyline, join, polyline
 from cnc_shape.program import PathMode
 
@@ -51,8 +51,10 @@ def test_corners_of_a_polygon_are_where_the_tangents_meet(radius, sweep, rise):
     edges = straighten(toolpath(arc(end, (0.0, 0.0, 0.0), sweep), start=(radius, 0.0, 0.0)))
     corners = naive.tangent_polygon(radius, rise, sweep, len(edges) - 1)
     assert_allclose(edges.start[1:-1], corners, atol=1e-11)
-    circle = np.pi * 2 / (abs(sweep) / (len(edges) - 2))  # as few as the share of the tolerance allows
-    assert rise or circle <= max(18.0, np.pi / np.sqrt(2 * 0.01 / 12 / radius)) * (1 + 2.0 / (len(edges) - 2))
+    count = len(corners)
+    if count > 1 and not rise:  # no more than it takes: one fewer would spend more than a quarter
+        step = abs(sweep) / (count - 1)
+        assert step > LARGEST_STEP or radius * (1 / np.cos(0.5 * step) - 1) > 0.25 * MERGING.path_tolerance
 
 
 @settings(max_examples=60)
