@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 # --- contour error --------------------------------------------------------------------------------
@@ -335,3 +337,87 @@ def sample_measures(rows, axes):
     squares = [((a - b) ** 2).sum(axis=1) for a, b in ((command, drive), (tool, drive), (velocity, 0.0))]
     worst = np.abs(acceleration).max(axis=1)
     return np.array([tool_error, drive_error, command_error, -tool_error, *squares, worst])
+
+
+# --- running sums, speed limits, polygons, ideal drives ---------------------------------------------
+
+
+def squares(values):
+    """Sum of the squares of each column, (d,), in the order of the rows."""
+    total = [0.0] * values.shape[1]
+    for row in values.tolist():
+        total = [old + x * x for old, x in zip(total, row, strict=True)]
+    return np.array(total)
+
+
+def largest_ratio(values, limit):
+    """Largest ``|value| / limit`` of any row and column; nan if any is."""
+    return (np.abs(values) / limit).max(initial=0.0)
+
+
+def bernstein(powers):
+    """Bernstein coefficients on [0, 1] of a polynomial, from those of its powers, lowest first."""
+    from math import comb
+
+    n = len(powers) - 1
+    return np.array([sum(comb(i, k) / comb(n, k) * powers[k] for k in range(i + 1)) for i in range(n + 1)])
+
+
+def speed_limits(rows, length, feed_rate, alone, velocity):
+    """Squared speed limits at both ends of a curved cell, from its polynomials in powers of s / length.
+
+    First each end by itself; then both lowered by the largest Bernstein coefficient of ``q'^2 x`` over its
+    limit. A cell that is run through at |q'| = 1 has the feed itself as a limit.
+    """
+    slopes = np.array([rows[1], 2.0 * rows[2] * length, 3.0 * rows[3] * length**2]).T
+    squares = [np.convolve(slope, slope) for slope in slopes]
+    path = sum(square for i, square in enumerate(squares) if (i < 3) != alone)
+    stretch = np.sqrt(bernstein(path).max())
+    full = 0.98 < stretch <= 1.0 + 2e-7
+    caps = []
+    for powers in ([1.0, 0.0, 0.0], [1.0, 1.0, 1.0]):
+        ratios = [1e6, *(most / abs(slope @ powers) for slope, most in zip(slopes, velocity, strict=True))]
+        along = 1.0 if full else np.sqrt(path[0] if powers[1] == 0.0 else path.sum())
+        caps.append(min([*ratios, feed_rate / along]) ** 2)
+    line = [caps[0], caps[1] - caps[0]]
+    excess = [1.0 if full else bernstein(np.convolve(path, line)).max() / feed_rate**2]
+    excess += [
+        bernstein(np.convolve(square, line)).max() / most**2
+        for square, most in zip(squares, velocity, strict=True)
+    ]
+    return np.array(caps) / max(*excess, 1.0)
+
+
+def tangent_polygon(radius, rise, sweep, edges):
+    """Corners of the polygon about a circle or helix: where tangents at equal steps meet, seen from above."""
+    touch = np.linspace(0.0, sweep, edges)
+    corners = []
+    for a, b in pairwise(touch):
+        left = np.array([[np.cos(a), np.sin(a)], [np.cos(b), np.sin(b)]])  # p . n = radius on each tangent
+        corners.append([*np.linalg.solve(left, [radius, radius]), rise * 0.5 * (a + b) / sweep])
+    return np.array(corners)
+
+
+def ideal_tool(command, axis):
+    """Tool of an axis whose drive is where it is told: each mode shaken by the cubic between samples.
+
+    One matrix exponential a mode, of ``w'' = -2 zeta omega w' - omega^2 w - p q''``, q'' and its slope states.
+    """
+    from scipy.linalg import expm
+
+    T = command.sample_time
+    tool = command.position[:, 0].copy()
+    for mode in axis.modes:
+        omega, p = 2 * np.pi * mode.natural_frequency, mode.participation
+        M = np.array(
+            [[0, 1, 0, 0], [-(omega**2), -2 * mode.damping_ratio * omega, -p, 0], [0, 0, 0, 1], [0, 0, 0, 0]]
+        )
+        S, state = expm(M * T), np.zeros(4)
+        for k in range(len(tool) - 1):
+            tool[k] += state[0]
+            (q0, q1), (v0, v1) = command.position[k : k + 2, 0], command.velocity[k : k + 2, 0]
+            start = 6 * (q1 - q0) / T**2 - (4 * v0 + 2 * v1) / T
+            end = -6 * (q1 - q0) / T**2 + (2 * v0 + 4 * v1) / T
+            state = S @ [state[0], state[1], start, (end - start) / T]
+        tool[-1] += state[0]
+    return tool

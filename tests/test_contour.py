@@ -14,8 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, rows, toolpath
 from scipy.optimize import minimize_scalar
 
-from cnc_shape.arrays import frozen
+from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.contour import ContourError, Tally, contour_error, foot_windows, measuring, tally
+from cnc_shape.kernels.foot_point import pack, points_at, runs
 from cnc_shape.segments import segments, since
 
 TURN = 2.0 * np.pi
@@ -423,6 +424,72 @@ def test_a_tally_does_not_depend_on_the_cut():
     assert state == at_once
     assert_allclose(at_once.rms, np.sqrt(np.mean(error.distance**2)), rtol=1e-14)
     assert at_once.max == error.distance.max()
+
+
+# --- the layout -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_segments_stand_for_the_programmed_curves_and_lie_in_their_boxes(seed):
+    path = some_path(seed)
+    laid = segments(path, first=True)
+    assert_array_equal(laid.line, path.line)
+    shares = np.linspace(0.0, 1.0, 41)
+    for row in range(len(path)):
+        points = naive.curve_points(path, row, shares)
+        at = frozen(naive.places(path, row, shares))
+        rows_ = frozen_integers(np.full(at.size, row))
+        found = points_at(at, rows_, laid.start, laid.end, laid.low, laid.high, laid.arc, laid.arcs)
+        assert_allclose(found, points, atol=1e-7)
+        assert (laid.boxes[row, :3] <= points).all()
+        assert (points <= laid.boxes[row, 3:]).all()
+
+
+def turning_path(seed, count=400):
+    """Short lines in runs of any length, that turn back now and then, and a few arcs between them."""
+    rng = np.random.default_rng(seed)
+    moves, at, heading = [], np.zeros(3), rng.uniform(0, TURN)
+    for k in range(count):
+        heading += rng.choice([0.02, 0.3, 3.0], p=[0.9, 0.07, 0.03]) * rng.normal()
+        step = 10 ** rng.uniform(-3, 0) * np.array([np.cos(heading), np.sin(heading), 0.1 * rng.normal()])
+        if k % 90 == 89:
+            center, at = at + 0.1 * np.eye(3)[0], at + 0.2 * np.eye(3)[0]
+            moves.append(arc(tuple(at), tuple(center), np.pi))
+        at = at + step
+        moves.append(line(*at))
+    return toolpath(*moves)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_runs_go_forward_and_are_in_order(seed):
+    laid = segments(turning_path(seed), first=True)
+    table = frozen(pack(laid.start, laid.end, laid.low, laid.high, laid.arc))
+    run, bounds, direction, ahead = runs(table)
+    assert_array_equal(run, np.repeat(np.arange(len(bounds)), np.diff(bounds, axis=1)[:, 0] + 1))
+    assert np.abs(direction).any(axis=1).any()
+    for (first, last), along in zip(bounds, direction, strict=True):
+        if along.any():
+            chord = laid.end[first : last + 1] - laid.start[first : last + 1]
+            assert (laid.arc[first : last + 1] < 0).all()
+            assert (chord @ along >= (0.5 - 1e-9) * np.linalg.norm(chord, axis=1)).all()
+            assert_allclose(ahead[first : last + 1], laid.start[first : last + 1] @ along, atol=1e-11)
+            assert (np.diff(ahead[first : last + 1]) >= 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_runs_equal_brute_force_for_signals_near_and_far(seed):
+    rng = np.random.default_rng(seed)
+    path = toolpath(*[line(*p) for p in turning_path(seed).end])
+    place = np.sort(rng.uniform(0, path.arc_length[-1], 300))
+    on_path = np.stack([np.interp(place, path.arc_length[1:], path.end[:, i]) for i in range(3)], axis=1)
+    for error, width in ((1e-4, 3.0), (0.1, 20.0), (5.0, 1000.0)):
+        points = on_path + error * rng.normal(size=(300, 3))
+        found = contour_error(points, path, place - width, place + width)
+        expected = [
+            naive.polyline_distance(p, path, a, b)
+            for p, a, b in zip(points, place - width, place + width, strict=True)
+        ]
+        assert_allclose(found.distance, expected, atol=1e-12)
 
 
 def test_an_empty_path_is_a_wrong_call():

@@ -180,6 +180,24 @@ def test_hats_take_the_time_of_toppra():
     assert_keeps(profile, MILL)
 
 
+@settings(max_examples=200)
+@given(st.integers(0, 10**6), st.sampled_from([3, 5]), st.booleans(), st.sampled_from([0.0, 1e-3, 0.3, 3.0]))
+def test_speed_limits_of_curved_cells_equal_their_slow_twin(seed, d, alone, bend):
+    rng = np.random.default_rng(seed)
+    alone = alone and d > 3
+    rows, length = rng.normal(size=(4, d)), 10 ** rng.uniform(-2, 1)
+    rows[1] /= np.linalg.norm(rows[1, 3:] if alone else rows[1, :3]) * rng.choice([1.0, 1.3])
+    rows[2:] *= bend * np.array([[1.0], [1.0 / length]]) / length
+    rows[2, 0] += 0.01 / length  # curved in any case
+    feed_rate, velocity = 10 ** rng.uniform(0, 3), 10 ** rng.uniform(1, 3, d)
+    limit_v2, straight = speed_limits(
+        frozen(rows[None]), frozen([length]), frozen([feed_rate]), frozen_integers([alone]),
+        frozen(velocity), frozen(np.full(d, 1e-9)),
+    )  # fmt: skip
+    assert straight[0] == 0.0
+    assert_allclose(limit_v2[0], naive.speed_limits(rows, length, feed_rate, alone, velocity), rtol=1e-9)
+
+
 def test_the_scan_is_the_solution_of_its_linear_programs():
     path = smooth(lines([[0, 0], [3, 1], [3.5, 4], [5, 4.2], [5.4, 4.1]], 80.0), Smoothing(0.1))
     velocity, acceleration = frozen([200.0] * 3), frozen([2000.0] * 3)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, toolpath
 
 from cnc_shape.kernels.chords import WINDOW
-from cnc_shape.kernels.polyline import EXACT_PATH_TOLERANCE
+from cnc_shape.kernels.polyline import EXACT_PATH_TOLERANCE, LARGEST_STEP
 from cnc_shape.polyline import Merging, Polyline, join, polyline
 from cnc_shape.program import PathMode
 
@@ -41,6 +41,20 @@ def test_a_polygon_about_an_arc_is_tangent_at_its_ends_and_outside_by_a_quarter(
     assert_allclose(MERGING.path_tolerance - edges.tolerance[0], polygon_error(edges, radius), atol=1e-12)
     assert_allclose(edges.place[-1], radius * abs(sweep), rtol=1e-12)
     assert_allclose(edges.travel.sum(), radius * abs(sweep), rtol=1e-12)
+
+
+@pytest.mark.parametrize("radius", [0.05, 1.0, 30.0])
+@pytest.mark.parametrize("sweep", [0.3, -2.0, 15.0])
+@pytest.mark.parametrize("rise", [0.0, 0.01, -4.0])
+def test_corners_of_a_polygon_are_where_the_tangents_meet(radius, sweep, rise):
+    end = (radius * np.cos(sweep), radius * np.sin(sweep), rise)
+    edges = straighten(toolpath(arc(end, (0.0, 0.0, 0.0), sweep), start=(radius, 0.0, 0.0)))
+    corners = naive.tangent_polygon(radius, rise, sweep, len(edges) - 1)
+    assert_allclose(edges.start[1:-1], corners, atol=1e-11)
+    count = len(corners)
+    if count > 1 and not rise:  # no more than it takes: one fewer would spend more than a quarter
+        step = abs(sweep) / (count - 1)
+        assert step > LARGEST_STEP or radius * (1 / np.cos(0.5 * step) - 1) > 0.25 * MERGING.path_tolerance
 
 
 @settings(max_examples=60)

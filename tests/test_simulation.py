@@ -153,6 +153,15 @@ def test_loop_equals_its_slow_twin():
     assert_allclose(response.tool, tool, atol=1e-11)
 
 
+def test_ideal_drives_equal_their_slow_twin():
+    axis = Axis("x", LIMITS, IdealDrive(), (Mode(30.0, 0.02, 0.8), Mode(100.0, 0.01, 0.2)))
+    command = point_to_point(T)
+    response = simulate(command, Machine("m", (axis,)), Control(T))
+    assert_array_equal(response.position, command.position)
+    assert_allclose(response.tool[:, 0], naive.ideal_tool(command, axis), atol=1e-10)
+    assert np.abs(response.tool - response.position).max() > 1e-3
+
+
 def test_feedforward_with_its_own_model_follows_without_error():
     command = point_to_point(T)
     loop = Control(T, 20.0, 0, Feedforward(1.0, 1.0))

@@ -1,0 +1,54 @@
+"""Every compiled function is held against an independent, slow definition: the table says where."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).resolve().parent
+PACKAGE = TESTS.parent / "cnc_shape"
+KERNEL = re.compile(r"^@kernel\ndef (\w+)", re.MULTILINE)
+
+# module: what its kernels are compared with, and the test file that does it. Kernels of one module call
+# one another; those that are called from outside are compared, and the rest with them.
+TWINS = {
+    "controllers/cross_coupling.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/feedforward.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/loop.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/position_loop.py": ("naive.servo_loop", "test_simulation.py"),
+    "kernels/arcs.py": ("naive.contour_distance", "test_contour.py"),
+    "kernels/cells.py": ("naive.hat_path", "test_smoothing.py"),
+    "kernels/chords.py": ("naive.chords", "test_polyline.py"),
+    "kernels/decimals.py": ("Fraction", "test_decimals.py"),
+    "kernels/extremes.py": ("naive.extremes", "test_recording.py"),
+    "kernels/foot_point.py": ("naive.polyline_distance", "test_contour.py"),
+    "kernels/hats.py": ("naive.hat_widths", "test_smoothing.py"),
+    "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
+    "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python
+    "kernels/plain_rows.py": ("read_rows", "test_plain_rows.py"),  # the reader in Python
+    "kernels/polyline.py": ("naive.tangent_polygon", "test_polyline.py"),
+    "kernels/sampling.py": ("naive.samples", "test_trajectory.py"),
+    "kernels/speed_limits.py": ("naive.speed_limits", "test_feedrate.py"),
+    "kernels/sums.py": ("naive.squares", "test_sums.py"),
+    "kernels/taps.py": ("naive.delayed_sum", "test_shaping.py"),
+    "kernels/time_law.py": ("naive.fastest", "test_feedrate.py"),
+}
+
+
+def modules() -> list[str]:
+    """Source files that hold a kernel."""
+    return sorted(
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if KERNEL.search(path.read_text(encoding="utf-8"))
+    )
+
+
+def test_every_module_with_kernels_has_a_twin_and_only_those():
+    assert modules() == sorted(TWINS)
+
+
+@pytest.mark.parametrize("module", TWINS)
+def test_the_twin_is_compared_where_the_table_says(module):
+    twin, test = TWINS[module]
+    assert re.search(rf"\b{re.escape(twin)}\b", (TESTS / test).read_text(encoding="utf-8"))
