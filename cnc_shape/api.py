@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from cnc_shape.config.dump import dump_machine
 from cnc_shape.config.setup import Setup
-from cnc_shape.opening import STANDARD_INPUT, digest, open_motion
+from cnc_shape.opening import digest, open_motion
 from cnc_shape.pipeline import Run, default_cases, pick_cases, run
 from cnc_shape.readers import ReadingOptions
+from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.report import folder as run_folder
 from cnc_shape.report.figures import Format, path_figure
 

@@ -197,11 +197,11 @@ def _kernels() -> Check:
 
 
 def _stale() -> Check:
-    """Kernels of other versions, or of other installations."""
+    """Kernels of other versions, of other installations, and of Python programs with other numba settings."""
     others = tuple(stale_caches())
     if not others:
         return Check("older kernels", Status.OK, "none")
-    value = f"{len(others)} caches of other versions or installations, {_size(others):.1f} MB"
+    value = f"{len(others)} caches of other versions, installations or numba settings, {_size(others):.1f} MB"
     hint = f"may be deleted: all in {others[0].parent} but the kernel cache named above"
     return Check("older kernels", Status.OK, value, hint)
 

@@ -28,7 +28,7 @@ class Mode:
     natural_frequency: float  # Hz, undamped
     damping_ratio: float  # -, 0 <= zeta < 1
     participation: float = 1.0  # -, share of the drive's acceleration that excites the mode
-    frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative to it
+    frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative; unused as yet
 
     def __post_init__(self) -> None:
         if (

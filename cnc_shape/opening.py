@@ -13,9 +13,8 @@ from cnc_shape.machine import LINEAR_DEFAULT
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
+from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.readers.trajectories import resample
-
-STANDARD_INPUT = "-"
 
 
 @dataclass(slots=True)
@@ -25,6 +24,7 @@ class OpenMotion:
     name: str
     path: str
     setup: Setup
+    lines: int  # of the file
     blocks: Iterator[Block]
     notes: list[Note] = field(default_factory=list[Note])
     moved: tuple[str, ...] = ()
@@ -70,7 +70,7 @@ def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) 
         options = replace(options, gcode=replace(options.gcode, tools=setup.tools))
     with reading(path, options) as opened:
         name = "stdin" if path == STANDARD_INPUT else Path(path).name
-        motion = OpenMotion(name, opened.source, setup, iter(()))
+        motion = OpenMotion(name, opened.source, setup, opened.lines, iter(()))
         if opened.timed is not None:
             command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
             blocks = replaying(command, toolpath)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool as G43 H and G41 D look it up."""
+    """A tool as G43 H looks it up; the diameter waits for cutter compensation."""
 
     number: int
     length: float = 0.0  # mm

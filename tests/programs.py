@@ -11,7 +11,7 @@ from cnc_shape.errors import ProgramError
 from cnc_shape.program import Program, concatenate
 from cnc_shape.readers import ReadingOptions, read_program
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import CHUNK_ROWS, ReadingLimits, Source
+from cnc_shape.readers.source import CHUNK_ROWS, COMPILED_FROM, ReadingLimits, Source
 
 DEFAULT = GcodeOptions()
 LIMITS = ReadingLimits()
@@ -29,11 +29,13 @@ def chunks(
     options: GcodeOptions = DEFAULT,
     *,
     rows: int = CHUNK_ROWS,
+    compiled_from: int = COMPILED_FROM,
     limits: ReadingLimits = LIMITS,
 ) -> list[Program]:
     """Read G-code from memory, as chunks."""
     source = from_memory(text, limits)
-    return list(interpret(source, survey(source, options.dialect), options, rows))
+    seen = survey(source, options.dialect)
+    return list(interpret(source, seen, options, rows=rows, compiled_from=compiled_from))
 
 
 def read(
@@ -41,10 +43,11 @@ def read(
     options: GcodeOptions = DEFAULT,
     *,
     rows: int = CHUNK_ROWS,
+    compiled_from: int = COMPILED_FROM,
     limits: ReadingLimits = LIMITS,
 ) -> Program:
     """Read G-code from memory."""
-    return concatenate(chunks(text, options, rows=rows, limits=limits))
+    return concatenate(chunks(text, options, rows=rows, compiled_from=compiled_from, limits=limits))
 
 
 def attempt(
@@ -52,19 +55,20 @@ def attempt(
     options: GcodeOptions = DEFAULT,
     *,
     rows: int = CHUNK_ROWS,
+    compiled_from: int = COMPILED_FROM,
     limits: ReadingLimits = LIMITS,
 ) -> Program | ProgramError:
     """Read G-code from memory; a refusal is an answer too."""
     try:
-        return read(text, options, rows=rows, limits=limits)
+        return read(text, options, rows=rows, compiled_from=compiled_from, limits=limits)
     except ProgramError as error:
         return error
 
 
-def attempt_file(path: Path, options: GcodeOptions = DEFAULT) -> Program | ProgramError:
+def attempt_file(path: Path, options: ReadingOptions | None = None) -> Program | ProgramError:
     """Read a file; a refusal is an answer too."""
     try:
-        return read_program(path, ReadingOptions(gcode=options))
+        return read_program(path, options)
     except ProgramError as error:
         return error
 

@@ -18,9 +18,11 @@ from cnc_shape import __version__, cli
 from cnc_shape.cli import run
 from cnc_shape.cli.errors import guarded
 from cnc_shape.cli.output import one_line, print_json
-from cnc_shape.cli.progress import progress
-from cnc_shape.config import check_machine
+from cnc_shape.cli.progress import line_by_line, progress
+from cnc_shape.config import bundled, check_machine, load_machine
 from cnc_shape.errors import InfeasibleError, ProgramError
+from cnc_shape.opening import open_motion
+from cnc_shape.readers import ReadingOptions
 
 HEAVY = ("numpy", "numba", "scipy", "pydantic", "yaml", "matplotlib", "jinja2")
 HELP_TIME = 0.3  # s of one processor
@@ -321,6 +323,18 @@ def test_progress_is_for_people(
     with progress("planning", 2.0, quiet=quiet) as advance:
         advance(1.0)
     assert ("planning" in stream.text) is seen
+
+
+def test_the_bar_advances_by_the_lines_of_the_program(tmp_path: Path) -> None:
+    program = tmp_path / "part.nc"
+    program.write_text("G21 G90 F600\n" + "G1 X1\n(to and fro)\nX0\n" * 10 + "M2\n")
+    advances: list[float] = []
+    with open_motion(str(program), load_machine(bundled("xy_stage.yaml")), ReadingOptions(rows=4)) as motion:
+        for _ in line_by_line(motion.blocks, advances.append):
+            pass
+    assert len(advances) > 2
+    assert min(advances) >= 0
+    assert sum(advances) == motion.lines - 1  # the last line moves nothing
 
 
 # --- init

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from programs import DEFAULT, LIMITS, assert_same, attempt, attempt_file, chunks
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import concatenate
-from cnc_shape.readers import source
+from cnc_shape.readers import ReadingOptions, source
 from cnc_shape.readers.gcode import Dialect, GcodeOptions, interpreter
 from cnc_shape.readers.source import CHUNK_ROWS, COMPILED_FROM, ReadingLimits
 
@@ -29,10 +28,10 @@ def assert_equal_answers(one, other):
 
 
 def assert_two_ways_agree(text, options=DEFAULT, rows=CHUNK_ROWS, limits=LIMITS):
-    compiled, readable = (replace(options, compiled_from=length) for length in (ALWAYS, NEVER))
-    assert_equal_answers(
-        attempt(text, compiled, rows=rows, limits=limits), attempt(text, readable, rows=rows, limits=limits)
+    compiled, readable = (
+        attempt(text, options, rows=rows, compiled_from=length, limits=limits) for length in (ALWAYS, NEVER)
     )
+    assert_equal_answers(compiled, readable)
 
 
 MODES = [
@@ -89,27 +88,27 @@ def test_limits_are_hit_at_the_same_line(text, blocks, line_bytes):
 
 def test_pieces_of_any_size(monkeypatch):
     text = "G1 F100 X0\nX1 Y2\n(a) X2\nG3 X4 Y2 I1\nG1 X7\nG1 X9.125\n\n\nG4 P1\nX1"
-    whole = read(text, GcodeOptions(compiled_from=NEVER))
+    whole = read(text, compiled_from=NEVER)
     for end in ("\n", "\r\n", "\r"):
         for size in range(1, len(text) + 2):
             monkeypatch.setattr(source, "BLOCK_BYTES", size)
-            assert_same(read(text.replace("\n", end), GcodeOptions(compiled_from=ALWAYS)), whole)
+            assert_same(read(text.replace("\n", end), compiled_from=ALWAYS), whole)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 1000, 20_000, 10**9])
 def test_chunks_of_any_size(rows):
     count = 300 if rows < 100 else 40_000
     program = "F100 G0 X0\n" + "".join(f"G1 X{k * 0.37:.3f} Y{k % 7}\n" for k in range(count))
-    parts = chunks(program, GcodeOptions(compiled_from=ALWAYS), rows=rows)
+    parts = chunks(program, compiled_from=ALWAYS, rows=rows)
     assert all(len(part) == rows for part in parts[:-1])
-    assert_same(concatenate(parts), read(program, GcodeOptions(compiled_from=NEVER)))
+    assert_same(concatenate(parts), read(program, compiled_from=NEVER))
 
 
 def test_numbers_are_floats_to_the_last_bit():
     values = np.random.default_rng(3).normal(scale=200.0, size=4000).tolist()
     forms = [lambda v: f"{v:.3f}", lambda v: f"{v:.15f}", repr, lambda v: f"{v:.9f}", lambda v: f"{v:.0f}"]
     texts = [forms[k % len(forms)](value) for k, value in enumerate(values)]
-    program = read("G1 F100 X0\n" + "".join(f"X{x}\n" for x in texts), GcodeOptions(compiled_from=ALWAYS))
+    program = read("G1 F100 X0\n" + "".join(f"X{x}\n" for x in texts), compiled_from=ALWAYS)
     np.testing.assert_array_equal(program.target[1:, 0], [float(text) for text in texts])
 
 
@@ -126,8 +125,9 @@ def test_long_programs_take_the_compiled_way_by_themselves(monkeypatch):
     line = "G1 F100 X1\n"
     read(line)
     assert not taken
-    read(line * (COMPILED_FROM // len(line) + 1))
-    assert sum(taken) == COMPILED_FROM // len(line) + 1
+    lines = COMPILED_FROM // len(line) + 1
+    read(line * lines)
+    assert sum(taken) == lines
 
 
 def test_every_reference_program_probe_and_hostile_input(shared):
@@ -137,8 +137,8 @@ def test_every_reference_program_probe_and_hostile_input(shared):
     assert len(paths) > 60
     for path in paths:
         assert_equal_answers(
-            attempt_file(path, GcodeOptions(compiled_from=ALWAYS)),
-            attempt_file(path, GcodeOptions(compiled_from=NEVER)),
+            attempt_file(path, ReadingOptions(compiled_from=ALWAYS)),
+            attempt_file(path, ReadingOptions(compiled_from=NEVER)),
         )
     for case in json.loads((folder / "probes.json").read_text()).values():
         assert_two_ways_agree(case["program"])

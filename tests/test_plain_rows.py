@@ -22,7 +22,8 @@ def answer(text, compiled_from, rows=100, limits=None):
     parts = []
     try:
         header = read_header(opened)
-        parts.extend(read_rows(opened, header, rows, compiled_from))  # what came before an error stays
+        # what came before an error stays
+        parts.extend(read_rows(opened, header, rows=rows, compiled_from=compiled_from))
     except ProgramError as error:
         return parts, str(error)
     return parts, None
@@ -99,7 +100,7 @@ def test_chunks_of_any_size(rows):
 def test_rows_before_an_error_are_handed_on_first():
     opened = from_memory("x_mm,y_mm\n1,2\n3,4\n5\n", name="path.csv")
     for compiled_from in (ALWAYS, NEVER):
-        rows = read_rows(opened, read_header(opened), 100, compiled_from)
+        rows = read_rows(opened, read_header(opened), rows=100, compiled_from=compiled_from)
         assert next(rows).line.tolist() == [2, 3]
         with pytest.raises(ProgramError, match="1 cells, the header has 2"):
             next(rows)

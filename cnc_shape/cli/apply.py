@@ -32,7 +32,7 @@ def apply(
     """Shape a program's axis commands and write them at the servo period."""
     from cnc_shape.applying import Application
     from cnc_shape.cli.output import print_json, print_text, warn
-    from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.progress import line_by_line, progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.errors import OptionError
@@ -44,8 +44,12 @@ def apply(
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     shapers = setup.acting_shapers
-    with open_motion(file, setup, options) as motion, progress("applying", None, quiet=quiet or json):
-        work = Application(motion.blocks, setup.machine, shapers, setup.control.sample_time)
+    with (
+        open_motion(file, setup, options) as motion,
+        progress("applying", motion.lines, quiet=quiet or json) as advance,
+    ):
+        blocks = line_by_line(motion.blocks, advance)
+        work = Application(blocks, setup.machine, shapers, setup.control.sample_time)
         _write(work, target, force=force)
         done = work.summary()
     notes = [] if shapers else ["this machine has no shapers: the command is written unshaped"]

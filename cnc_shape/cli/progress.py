@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from cnc_shape.cli.output import print_error
+
+if TYPE_CHECKING:
+    from cnc_shape.motion import Block
 
 Advance = Callable[[float], None]
 
@@ -47,6 +51,17 @@ def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advanc
     finally:
         kernels.setLevel(level)
         kernels.removeHandler(told)
+
+
+def line_by_line(blocks: Iterable[Block], advance: Advance) -> Iterator[Block]:
+    """Hand on the blocks of a motion; advance by the lines of the program that each has brought."""
+    done = 0
+    for block in blocks:
+        yield block
+        if block.toolpath is not None and len(block.toolpath):
+            line = max(done, int(block.toolpath.line[-1]))
+            advance(line - done)
+            done = line
 
 
 @contextmanager

@@ -55,7 +55,7 @@ def simulate(
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
     from cnc_shape.cli.output import print_error, print_json, warn
-    from cnc_shape.cli.progress import progress
+    from cnc_shape.cli.progress import line_by_line, progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
@@ -75,8 +75,12 @@ def simulate(
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    with open_motion(source, setup, options) as motion, progress("simulating", None, quiet=quiet or json):
-        result = run(motion.blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals)
+    with (
+        open_motion(source, setup, options) as motion,
+        progress("simulating", motion.lines, quiet=quiet or json) as advance,
+    ):
+        blocks = line_by_line(motion.blocks, advance)
+        result = run(blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals)
     page = None
     if wanted:
         from cnc_shape.api import report_context

@@ -14,6 +14,8 @@ from cnc_shape.kernels import kernel
 POWERS = np.array([float(f"1e{power}") for power in range(23)])  # exact
 WHOLE_POWERS = np.array([10**power for power in range(19)], dtype=np.int64)
 MOST = 10**17  # a whole number below it takes one digit more
+TAB, SPACE, PLUS, MINUS, POINT, ZERO, NINE = (ord(sign) for sign in "\t +-.09")
+CAPITAL_E, SMALL_E = ord("E"), ord("e")
 EXACT = 1 << 53  # whole numbers up to it are floats; the 54th bit from below
 LARGEST_EXPONENT = 9999
 
@@ -50,18 +52,18 @@ def decimal(text, at, blanks, exponents):
     be told here. `blanks`: spaces and tabs may stand inside; `exponents`: ``e-3`` may follow.
     """
     size = text.size
-    while blanks and at < size and (text[at] == 32 or text[at] == 9):
+    while blanks and at < size and (text[at] == SPACE or text[at] == TAB):
         at += 1
     negative = False
-    if at < size and (text[at] == 45 or text[at] == 43):
-        negative = text[at] == 45
+    if at < size and (text[at] == MINUS or text[at] == PLUS):
+        negative = text[at] == MINUS
         at += 1
     whole = 0
     places = 0  # behind the point
     step = 0  # of places, 1 behind the point
     digits = False
     while at < size:
-        digit = text[at] - 48
+        digit = text[at] - ZERO
         if 0 <= digit <= 9:
             digits = True
             if whole < MOST:
@@ -69,24 +71,24 @@ def decimal(text, at, blanks, exponents):
                 places += step
             elif digit > 0 or step == 0:
                 return 0.0, at, False  # more digits than fit
-        elif digit == -2 and step == 0:
+        elif text[at] == POINT and step == 0:
             step = 1
-        elif not blanks or (digit != -16 and digit != -39):
+        elif not blanks or (text[at] != SPACE and text[at] != TAB):
             break
         at += 1
     if not digits:
         return 0.0, at, False
-    if exponents and at < size and (text[at] == 101 or text[at] == 69):
+    if exponents and at < size and (text[at] == SMALL_E or text[at] == CAPITAL_E):
         at += 1
         down = False
-        if at < size and (text[at] == 45 or text[at] == 43):
-            down = text[at] == 45
+        if at < size and (text[at] == MINUS or text[at] == PLUS):
+            down = text[at] == MINUS
             at += 1
         exponent = 0
         digits = False
-        while at < size and 48 <= text[at] <= 57:
+        while at < size and ZERO <= text[at] <= NINE:
             digits = True
-            exponent = exponent * 10 + (text[at] - 48)
+            exponent = exponent * 10 + (text[at] - ZERO)
             at += 1
             if exponent > LARGEST_EXPONENT:
                 return 0.0, at, False

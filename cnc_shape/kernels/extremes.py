@@ -58,8 +58,8 @@ def sample_measures(rows, axes):
     Contour error of the tool, of the drives and of the command; the tool's with its sign turned; squares of
     following error, of deflection and of speed; largest acceleration of an axis.
 
-    rows (n,c): command, drives, tool, velocity and acceleration, `axes` columns each, then the contour errors
-    of command, drives and tool.
+    rows (n,c): command, drives and tool in mm, velocity in mm/s and acceleration in mm/s^2, `axes` columns
+    each, then the contour errors of command, drives and tool in mm.
     """
     count = rows.shape[0]
     measures = np.empty((8, count))

@@ -6,6 +6,7 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.decimals import decimal
 
+NUL, LINE_END, LEFT_PARENTHESIS, RIGHT_PARENTHESIS = 0, ord("\n"), ord("("), ord(")")
 # what a byte may be
 FOREIGN, BLANK, REMARK, OPENING, FIRST_WORD = 0, 1, 2, 3, 4
 # words, counted from FIRST_WORD: six axes, then
@@ -25,7 +26,7 @@ def words_of(text, at, roles, largest, present, value):
     count = 0
     for word in range(WORDS):
         present[word] = False
-    while at < size and text[at] != 10:
+    while at < size and text[at] != LINE_END:
         role = roles[text[at]]
         if role >= FIRST_WORD:
             word = role - FIRST_WORD
@@ -40,14 +41,14 @@ def words_of(text, at, roles, largest, present, value):
         elif role == BLANK:
             at += 1
         elif role == REMARK:
-            while at < size and text[at] != 10:
-                if text[at] == 0:
+            while at < size and text[at] != LINE_END:
+                if text[at] == NUL:
                     return at, count, False
                 at += 1
         elif role == OPENING:
             at += 1
-            while at < size and text[at] != 41:
-                if text[at] == 10 or text[at] == 40 or text[at] == 0:
+            while at < size and text[at] != RIGHT_PARENTHESIS:
+                if text[at] == LINE_END or text[at] == LEFT_PARENTHESIS or text[at] == NUL:
                     return at, count, False
                 at += 1
             if at == size:

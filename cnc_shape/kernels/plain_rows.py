@@ -2,13 +2,15 @@
 """Plain rows of a table, straight from its bytes: numbers between commas."""
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.decimals import decimal
+from cnc_shape.kernels.decimals import SPACE, TAB, decimal
+
+LINE_END, COMMA = ord("\n"), ord(",")
 
 
 @kernel
 def skip_blanks(text, at):
     """Return the place of the first byte from `at` on that is no space and no tab."""
-    while at < text.size and (text[at] == 32 or text[at] == 9):
+    while at < text.size and (text[at] == SPACE or text[at] == TAB):
         at += 1
     return at
 
@@ -27,7 +29,7 @@ def plain_rows(text, at, line, line_bytes, scales, bounds, table, lines, count):
     taken = 0
     while at < size and count < table.shape[0]:
         stop = skip_blanks(text, at)
-        blank = stop == size or text[stop] == 10
+        blank = stop == size or text[stop] == LINE_END
         if not blank:
             plain = True
             for column in range(columns):
@@ -37,8 +39,8 @@ def plain_rows(text, at, line, line_bytes, scales, bounds, table, lines, count):
                 value *= scales[column]
                 stop = skip_blanks(text, stop)
                 last = column == columns - 1
-                ended = stop == size or text[stop] == 10
-                if ended != last or (not last and text[stop] != 44) or not abs(value) <= bounds[column]:
+                ended = stop == size or text[stop] == LINE_END
+                if ended != last or (not last and text[stop] != COMMA) or not abs(value) <= bounds[column]:
                     plain = False
                     break
                 table[count, column] = value

@@ -14,6 +14,7 @@ from cnc_shape.program import Program, concatenate
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
 from cnc_shape.readers.source import (
     CHUNK_ROWS,
+    COMPILED_FROM,
     ReadingLimits,
     Source,
     blocks,
@@ -48,6 +49,7 @@ class ReadingOptions:
     curve: Curve = Curve.POLYLINE  # of way-points
     closed: bool = False  # way-points return to the first
     rows: int = CHUNK_ROWS  # of a chunk
+    compiled_from: int = COMPILED_FROM  # bytes: in longer texts, plain lines take the compiled way
     limits: ReadingLimits = field(default_factory=ReadingLimits)
 
 
@@ -70,7 +72,7 @@ Reader = Callable[[Source, ReadingOptions], Reading]
 def gcode_reading(source: Source, options: ReadingOptions) -> Reading:
     """Read a program of G-code."""
     seen = survey(source, options.gcode.dialect)
-    chunks = interpret(source, seen, options.gcode, rows=options.rows)
+    chunks = interpret(source, seen, options.gcode, rows=options.rows, compiled_from=options.compiled_from)
     return Reading(source.name, seen.dialect.value, seen.lines, seen.axes, chunks, evidence=seen.evidence)
 
 
@@ -79,11 +81,12 @@ def table_reading(source: Source, options: ReadingOptions) -> Reading:
     if options.curve is not Curve.POLYLINE:
         raise OptionError(f"--path {options.curve.value} is not built yet", hint="take --path polyline")
     header = read_header(source)
+    rows, compiled_from = options.rows, options.compiled_from
     count = sum(count_lines(block) for block in blocks(source))
     if TIME in header.names:
-        points = read_timed_points(source, header, rows=options.rows)
+        points = read_timed_points(source, header, rows=rows, compiled_from=compiled_from)
         return Reading(source.name, CSV, count, header.axes, iter([timed_program(points)]), points)
-    chunks = read_waypoints(source, header, closed=options.closed, rows=options.rows)
+    chunks = read_waypoints(source, header, closed=options.closed, rows=rows, compiled_from=compiled_from)
     return Reading(source.name, CSV, count, header.axes, chunks)
 
 

@@ -12,17 +12,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import ROTARY, XYZ
-from cnc_shape.readers.source import (
-    CHUNK_ROWS,
-    COMPILED_FROM,
-    Bytes,
-    Source,
-    as_bytes,
-    blocks,
-    line_at,
-    lines,
-    text_of,
-)
+from cnc_shape.readers.source import Bytes, Source, as_bytes, blocks, line_at, lines, text_of
 from cnc_shape.units import DEGREE, MM_PER_INCH, MM_PER_MIN
 
 _LENGTHS = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1e3, "in": MM_PER_INCH}
@@ -117,9 +107,7 @@ def join_rows(parts: Sequence[Rows]) -> Rows:
     )
 
 
-def read_rows(
-    source: Source, header: Header, rows: int = CHUNK_ROWS, compiled_from: int = COMPILED_FROM
-) -> Iterator[Rows]:
+def read_rows(source: Source, header: Header, *, rows: int, compiled_from: int) -> Iterator[Rows]:
     """Yield the rows of a table, at most `rows` at a time; blank lines are skipped.
 
     In a text of `compiled_from` bytes or more plain rows take the compiled way; the answer is the same.

@@ -28,8 +28,8 @@ class TimedPoints:
     line: IntArray  # (n,)
 
 
-def read_timed_points(source: Source, header: Header, *, rows: int) -> TimedPoints:
-    """Read all rows, `rows` at a time; time counts from the first.
+def read_timed_points(source: Source, header: Header, *, rows: int, compiled_from: int) -> TimedPoints:
+    """Read all rows as `read_rows` does; time counts from the first.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_timed_points(source: Source, header: Header, *, rows: int) -> TimedPoin
     clock = header.names.index(TIME)
     parts: list[Rows] = []
     before = -np.inf
-    for part in read_rows(source, header, rows):
+    for part in read_rows(source, header, rows=rows, compiled_from=compiled_from):
         time = part.values[:, clock]
         last = np.concatenate([[before], time[:-1]])
         wrong = np.flatnonzero(time < last + SHORTEST)

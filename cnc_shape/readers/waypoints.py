@@ -49,7 +49,9 @@ def polyline(source: str, axes: tuple[str, ...], points: FloatArray, line: IntAr
     )
 
 
-def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -> Iterator[Program]:
+def read_waypoints(
+    source: Source, header: Header, *, closed: bool, rows: int, compiled_from: int
+) -> Iterator[Program]:
     """Yield the polyline through the way-points in chunks of `rows` moves.
 
     The path starts at the first way-point; a row's feed belongs to the move that ends there. A move of rotary
@@ -63,6 +65,8 @@ def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -
         Whether a last move returns to the first way-point.
     rows
         Of a chunk, at least 1.
+    compiled_from
+        bytes, as in `read_rows`.
 
     Raises
     ------
@@ -74,7 +78,7 @@ def read_waypoints(source: Source, header: Header, *, closed: bool, rows: int) -
     first: Rows | None = None  # the row where the path begins
     kept: Rows | None = None  # the row where the next chunk begins
     found = 0
-    for part in read_rows(source, header, rows):
+    for part in read_rows(source, header, rows=rows, compiled_from=compiled_from):
         if feed is not None:
             slow = np.flatnonzero(part.values[:, feed] < SLOWEST)
             if slow.size:

@@ -64,6 +64,7 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         autoescape=True, trim_blocks=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
     summary, first, best = run.summary, run.summary.cases[0], best_case(run.summary)
+    archived = [signals for signals in run.signals if signals.samples is None]  # no more than is drawn
     pictures = {
         name: {
             "data": base64.b64encode(page.figures[name]).decode(),
@@ -103,8 +104,8 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         worst=_place_rows(run, best.name, page.program) if run.signals else [],
         warnings=[one_line(warning) for warning in page.warnings],
         machine=page.machine,
-        factor=max((s.factor for s in run.signals if s.samples is None), default=1),
-        bucket=max((s.bucket for s in run.signals if s.samples is None), default=1),
+        factor=max((signals.factor for signals in archived), default=1),
+        bucket=max((signals.bucket for signals in archived), default=1),
     )
 
 

@@ -24,16 +24,7 @@ from cnc_shape.readers.gcode.motion import ARCS, dwell, move
 from cnc_shape.readers.gcode.plain import take_plain_moves
 from cnc_shape.readers.gcode.rows import Rows, to_program
 from cnc_shape.readers.gcode.settings import apply_after, apply_before
-from cnc_shape.readers.source import (
-    CHUNK_ROWS,
-    COMPILED_FROM,
-    Bytes,
-    Source,
-    as_bytes,
-    blocks,
-    line_at,
-    text_of,
-)
+from cnc_shape.readers.source import Bytes, Source, as_bytes, blocks, line_at, text_of
 from cnc_shape.tools import Tool
 
 _LEFT_OVER = frozenset("NFSTO")
@@ -46,7 +37,6 @@ class GcodeOptions:
     dialect: Dialect | None = None  # None: decided on evidence
     block_delete: bool = False  # lines that start with / are skipped
     tools: tuple[Tool, ...] = ()
-    compiled_from: int = COMPILED_FROM  # bytes: in longer texts, plain lines take the compiled way
 
 
 class Interpreter:
@@ -244,9 +234,11 @@ def _one_owner(block: Block, modal: Modal) -> None:
 
 
 def interpret(
-    source: Source, survey: Survey, options: GcodeOptions, rows: int = CHUNK_ROWS
+    source: Source, survey: Survey, options: GcodeOptions, *, rows: int, compiled_from: int
 ) -> Iterator[Program]:
     """Yield the program in chunks of at least `rows` rows; the last holds the rest.
+
+    In a text of `compiled_from` bytes or more plain lines take the compiled way; the answer is the same.
 
     Raises
     ------
@@ -254,7 +246,7 @@ def interpret(
         At the first thing that is wrong, with its line and column.
     """
     machine = Interpreter(source, survey, options)
-    compiled = source.size >= options.compiled_from
+    compiled = source.size >= compiled_from
     for block in blocks(source):
         text = as_bytes(block)
         at = 0
