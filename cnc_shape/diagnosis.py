@@ -185,7 +185,7 @@ def _kernels() -> Check:
         from cnc_shape.kernels import cache_folder, compiled_count, kernel_count
     except ImportError:
         return Check("kernels", Status.MISSING, "none without numba", "see numba above")
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+    if interpreted():
         hint = "unset NUMBA_DISABLE_JIT: a hundred times faster"
         return Check("kernels", Status.WARNING, "interpreted", hint)
     compiled, total = compiled_count(), kernel_count()
@@ -194,6 +194,11 @@ def _kernels() -> Check:
         hint = "cnc-shape doctor --warm compiles them ahead; else the first run does"
         return Check("kernels", Status.WARNING, value, hint)
     return Check("kernels", Status.OK, value)
+
+
+def interpreted() -> bool:
+    """Whether kernels run as Python: NUMBA_DISABLE_JIT is set."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 
 def _stale() -> Check:

@@ -104,6 +104,12 @@ def test_what_a_run_can_do_without_is_a_warning(monkeypatch, tmp_path):
         assert check.hint, name
 
 
+def test_interpreted_kernels_cannot_be_warmed(monkeypatch, capfd):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert run(["doctor", "--warm"]) == 2
+    assert "unset NUMBA_DISABLE_JIT" in capfd.readouterr().err
+
+
 def test_a_cache_that_nobody_can_write_is_missing(monkeypatch):
     monkeypatch.setattr(diagnosis, "writable", lambda folder: False)
     assert found("kernel cache").status is Status.MISSING

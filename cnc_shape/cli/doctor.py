@@ -24,8 +24,11 @@ def doctor(
     """Look at versions, cores, write access, kernels and browser; say what to do about what is missing."""
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.output import print_json, print_text
-    from cnc_shape.diagnosis import Status, diagnose
+    from cnc_shape.diagnosis import Status, diagnose, interpreted
+    from cnc_shape.errors import OptionError
 
+    if warm and interpreted():
+        raise OptionError("nothing to compile: NUMBA_DISABLE_JIT is set", hint="unset NUMBA_DISABLE_JIT")
     checks = diagnose()
     essential = all(check.status is not Status.MISSING for check in checks)
     seconds = None
