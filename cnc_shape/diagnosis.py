@@ -122,7 +122,7 @@ def _bundled() -> Check:
 
 def _machine() -> Check:
     chosen = os.environ.get(MACHINE)
-    if chosen is None:
+    if not chosen:
         return Check("machine", Status.OK, f"the bundled XY stage; -m FILE or {MACHINE} chooses another")
     if Path(chosen).is_file():
         return Check("machine", Status.OK, f"{chosen}, from {MACHINE}", f"cnc-shape check {chosen}")
@@ -165,7 +165,7 @@ def _text(path: str) -> str:
 def _cache() -> Check:
     try:
         from cnc_shape.kernels import cache_folder, user_cache
-    except ImportError:
+    except Exception:  # as in _dependency, which names it
         return Check("kernel cache", Status.MISSING, "no kernels without numba", "see numba above")
     folder = cache_folder()
     try:
@@ -183,7 +183,7 @@ def _cache() -> Check:
 def _kernels() -> Check:
     try:
         from cnc_shape.kernels import cache_folder, compiled_count, kernel_count
-    except ImportError:
+    except Exception:  # as in _dependency, which names it
         return Check("kernels", Status.MISSING, "none without numba", "see numba above")
     if interpreted():
         hint = "unset NUMBA_DISABLE_JIT: a hundred times faster"
@@ -215,7 +215,7 @@ def stale_caches() -> Iterator[Path]:
     """Yield the folders with machine code that this installation does not use."""
     try:
         from cnc_shape.kernels import FOLDER_NAME, cache_folder
-    except ImportError:
+    except Exception:  # as in _dependency, which names it
         return
     current = cache_folder()
     if current.parent.name != FOLDER_NAME:  # a folder for this run alone, among those of other programs

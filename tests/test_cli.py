@@ -57,6 +57,14 @@ sys.stderr.write(repr((status, loaded)))
 """
 
 
+@pytest.mark.parametrize(("error", "status"), [(KeyboardInterrupt(), 130), (cli.Terminated(), 143)])
+def test_a_signal_while_the_command_line_is_built(
+    error: BaseException, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(typer.main, "get_command", lambda app: raising(error)())
+    assert run(["--version"]) == status
+
+
 @pytest.mark.parametrize(("word", "status"), [("--help", 0), ("--version", 0), ("--nonsense", 2)])
 def test_nothing_heavy_is_imported_to_answer(word: str, status: int) -> None:
     done = python(ASK, word)

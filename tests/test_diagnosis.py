@@ -82,6 +82,18 @@ def test_without_a_dependency_the_doctor_still_speaks_and_exits_with_1():
     assert "numpy" not in missing
 
 
+def test_a_numba_that_fails_in_its_own_way_is_missing_too():
+    done = cnc_shape("doctor", "--json", NUMBA_NUM_THREADS="0")  # numba raises ValueError when imported
+    assert done.returncode == 1, done.stderr
+    status = {check["name"]: check["status"] for check in json.loads(done.stdout)["checks"]}
+    assert {status[name] for name in ("numba", "kernel cache", "kernels")} == {"missing"}
+
+
+def test_an_empty_choice_of_a_machine_is_none(monkeypatch):
+    monkeypatch.setenv("CNC_SHAPE_MACHINE", "")
+    assert found("machine").status is Status.OK
+
+
 def test_a_version_that_is_too_old_or_absent_is_missing(monkeypatch):
     monkeypatch.setitem(diagnosis.DEPENDENCIES, "numpy", ("numpy", "1000.0"))
     assert found("numpy").status is Status.MISSING

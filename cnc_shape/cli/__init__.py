@@ -66,11 +66,13 @@ for _command in COMMANDS:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line (without the program's name) and return its exit code."""
-    command = typer.main.get_command(app)
     words = list(arguments)
-    return guarded(
-        lambda: command.main(args=words, prog_name="cnc-shape", standalone_mode=False), json="--json" in words
-    )
+
+    def command() -> object:  # to build it takes a while, in which a signal may come
+        built = typer.main.get_command(app)
+        return built.main(args=words, prog_name="cnc-shape", standalone_mode=False)
+
+    return guarded(command, json="--json" in words)
 
 
 def _terminate(signum: int, frame: FrameType | None) -> None:
