@@ -18,7 +18,7 @@ from math import sqrt
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels.foot_point import feet, pack, points_at, runs, stack_boxes
+from cnc_shape.kernels.foot_point import feet, pack, points_at, stack_boxes
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.segments import NO_SEGMENTS, Segments, join, segments, since
 from cnc_shape.toolpath import Toolpath
@@ -145,14 +145,12 @@ def _measure(
         raise ValueError("a contour error needs a path")
     table = frozen(pack(path.start, path.end, path.low, path.high, path.arc))
     tree, first = stack_boxes(path.boxes)
-    run, bounds, direction, ahead = runs(table)
     errors: list[ContourError] = []
     for signal in signals:
         points = frozen(signal[:, :3])
         distance, place, segment = feet(
-            points, lower, upper, table, path.low, path.high, path.arcs, path.boxes, tree, first,
-            run, bounds, direction, ahead,
-        )  # fmt: skip
+            points, lower, upper, table, path.low, path.high, path.arcs, path.boxes, tree, first
+        )
         foot = points_at(
             frozen(place), frozen_integers(segment),
             path.start, path.end, path.low, path.high, path.arc, path.arcs,

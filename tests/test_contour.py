@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 
 from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.contour import ContourError, Tally, contour_error, foot_windows, measuring, tally
-from cnc_shape.kernels.foot_point import pack, points_at, runs
+from cnc_shape.kernels.foot_point import points_at
 from cnc_shape.segments import segments, since
 
 TURN = 2.0 * np.pi
@@ -461,23 +461,7 @@ def turning_path(seed, count=400):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_runs_go_forward_and_are_in_order(seed):
-    laid = segments(turning_path(seed), first=True)
-    table = frozen(pack(laid.start, laid.end, laid.low, laid.high, laid.arc))
-    run, bounds, direction, ahead = runs(table)
-    assert_array_equal(run, np.repeat(np.arange(len(bounds)), np.diff(bounds, axis=1)[:, 0] + 1))
-    assert np.abs(direction).any(axis=1).any()
-    for (first, last), along in zip(bounds, direction, strict=True):
-        if along.any():
-            chord = laid.end[first : last + 1] - laid.start[first : last + 1]
-            assert (laid.arc[first : last + 1] < 0).all()
-            assert (chord @ along >= (0.5 - 1e-9) * np.linalg.norm(chord, axis=1)).all()
-            assert_allclose(ahead[first : last + 1], laid.start[first : last + 1] @ along, atol=1e-11)
-            assert (np.diff(ahead[first : last + 1]) >= 0.0).all()
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_runs_equal_brute_force_for_signals_near_and_far(seed):
+def test_windows_of_any_length_equal_brute_force_for_signals_near_and_far(seed):
     rng = np.random.default_rng(seed)
     path = toolpath(*[line(*p) for p in turning_path(seed).end])
     place = np.sort(rng.uniform(0, path.arc_length[-1], 300))

@@ -6,14 +6,10 @@ from math import inf, sqrt
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.arcs import TWO_PI, angle_at, beyond, length_at, nearest_on_arc, reach
+from cnc_shape.kernels.arcs import TWO_PI, angle_at, length_at, nearest_on_arc, reach
 
 FAN_BITS = 2
 FAN = 1 << FAN_BITS  # boxes that one box of the next level holds
-FEW = 8  # segments that are looked at one by one
-LONG_RUN = 16  # lines that a run must have to be worth its projection
-STEEPEST_V2 = 0.25  # -, square of the least cosine between a line of a run and its direction
-RUN_ROUNDING = 4e-9  # mm, more than the rounding of projections of coordinates below 1e6 mm
 
 
 @kernel
@@ -79,58 +75,18 @@ def box_distance_v2(boxes, j, x, y, z):
 
 
 @kernel
-def runs(table):
-    """Stretches of lines that all go forward along one direction, so that they can be sought in order.
-
-    table (m,11) from `pack`. Returns run (m,), the run of each segment; bounds (r,2), its first and last
-    segment; direction (r,3), unit, or 0 where there is none: arcs, and lines that turn back too soon; and
-    ahead (m,) mm, the start of each segment along the direction of its run, which rises within the run.
-    """
-    m = table.shape[0]
-    run, ahead = np.empty(m, np.int64), np.zeros(m)
-    bounds, direction = np.empty((m, 2), np.int64), np.zeros((m, 3))
-    n = begin = 0
-    while begin < m:
-        ux, uy, uz, scale = table[begin, 3], table[begin, 4], table[begin, 5], sqrt(table[begin, 6])
-        ux, uy, uz = ux * scale, uy * scale, uz * scale
-        end = begin
-        while end < m and table[end, 7] < 0.0:
-            forward = ux * table[end, 3] + uy * table[end, 4] + uz * table[end, 5]
-            if not (forward > 0.0 and forward * forward * table[end, 6] > STEEPEST_V2):
-                break
-            end += 1
-        if end - begin >= LONG_RUN:
-            bounds[n, 0] = begin
-            direction[n, 0], direction[n, 1], direction[n, 2] = ux, uy, uz
-            farthest = -inf
-            for j in range(begin, end):
-                farthest = max(farthest, ux * table[j, 0] + uy * table[j, 1] + uz * table[j, 2])
-                ahead[j] = farthest
-        else:
-            end = max(end, begin + 1)
-            if n > 0 and direction[n - 1, 0] == direction[n - 1, 1] == direction[n - 1, 2] == 0.0:
-                n -= 1  # one more of a stretch without direction
-            else:
-                bounds[n, 0] = begin
-        bounds[n, 1] = end - 1
-        run[begin:end] = n
-        n += 1
-        begin = end
-    return run, bounds[:n], direction[:n], ahead
-
-
-@kernel
-def seek(places, value, guess, first, last):
-    """Smallest j in [first, last) with places[j] >= value, or last; they rise. Quick with a near guess."""
+def seek(places, value, guess):
+    """Smallest j with places[j] >= value, or places.size; places (m,) rise. Quick if `guess` is near it."""
+    size = places.size
     left, right, stride = guess, guess, 1
-    while left >= first and places[left] >= value:
+    while left >= 0 and places[left] >= value:
         right = left
-        left = left - stride if left >= first + stride else first - 1
+        left = left - stride if left >= stride else -1
         stride *= 2
     stride = 1
-    while right < last and not places[right] >= value:
+    while right < size and not places[right] >= value:
         left = right
-        right = min(right + stride, last)
+        right = min(right + stride, size)
         stride *= 2
     while right - left > 1:  # places[left] < value <= places[right]
         middle = (left + right) // 2
@@ -204,20 +160,17 @@ def descend(table, guess, begin, finish, x, y, z):
 
 
 @kernel
-def feet(
-    points, lower, upper, table, low, high, arcs, boxes, tree, first, run, bounds, direction, ahead
-):  # fmt: skip
+def feet(points, lower, upper, table, low, high, arcs, boxes, tree, first):
     """Nearest points of the path, each within its own window of it.
 
     The least squared distance of all segments in the window wins; among equals, the smallest place.
-    A first guess is the distance to a place ahead of the foot before by as much as that one moved. With it,
-    nearly all is out of reach: of the run of lines where the guess is, what lies farther ahead or behind
-    along the run's direction; of the rest of the window, each box that is farther away. Both only spare
-    work: what is passed over is farther by more than any rounding, so the result does not depend on them.
+    The search goes through the segments that touch the window, in order, and leaves out each box that is
+    farther away than the best so far, or than a first guess: the distance to a place ahead of the foot
+    before by as much as that one moved. With it, nearly all boxes are out of reach. Both only spare work:
+    what is passed over is farther by more than any rounding, so the result does not depend on them.
 
     points (n,3) mm; lower, upper (n,) mm of path; table (m,11) from `pack`; low, high (m,) mm of path;
-    arcs (a,17); boxes (m,6); tree (b,6), first (l+1,) from `stack_boxes`; run (m,), bounds (r,2), direction
-    (r,3), ahead (m,) from `runs`.
+    arcs (a,17); boxes (m,6); tree (b,6), first (l+1,) from `stack_boxes`.
     Returns distance (n,), place (n,), segment (n,).
     """
     n, m, levels = points.shape[0], low.size, first.size - 1
@@ -227,8 +180,8 @@ def feet(
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         window_low = min(max(lower[k], low[0]), high[m - 1])
         window_high = max(min(upper[k], high[m - 1]), window_low)
-        begin = min(seek(high, window_low, begin, 0, m), m - 1)  # the first that ends in the window or after
-        finish = seek(low, window_high, finish, 0, m)  # the last that starts in the window or before
+        begin = min(seek(high, window_low, begin), m - 1)  # the first that ends in the window or after
+        finish = seek(low, window_high, finish)  # the last that starts in the window or before
         if finish == m or low[finish] > window_high:
             finish -= 1
         finish = max(finish, begin)
@@ -241,62 +194,41 @@ def feet(
             tried = guess
             best, best_place = nearest_on_segment(table, arcs, guess, x, y, z, window_low, window_high, inf)
             bound = best
-        within = beyond(bound)
-        limit = within * within
-        left, right, run_left, run_right = begin, finish, begin, finish
-        r = run[guess]
-        if finish - begin >= FEW and not direction[r, 0] == direction[r, 1] == direction[r, 2] == 0.0:
-            run_left, run_right = max(bounds[r, 0], begin), min(bounds[r, 1], finish)
-            along = direction[r, 0] * x + direction[r, 1] * y + direction[r, 2] * z
-            reached = within + RUN_ROUNDING
-            left = max(seek(ahead, along - reached, guess, run_left, run_right + 1) - 1, run_left)
-            right = max(seek(ahead, along + reached, left, run_left, run_right + 1) - 1, left)
-        for part in range(3):  # near in the run, before it, after it
-            j, until = left, right
-            if part == 1:
-                j, until = begin, run_left - 1
-            elif part == 2:
-                j, until = run_right + 1, finish
-            top = 0
-            if until - j >= FEW:
-                top = 1  # boxes larger than half the stretch tell nothing
-                while top < levels and (2 << (FAN_BITS * (top + 1))) <= until - j:
-                    top += 1
-            level = top
-            while j <= until:
-                if level > 0:
-                    block = j >> (FAN_BITS * level)
-                    if box_distance_v2(tree, first[level - 1] + block, x, y, z) <= limit:
-                        level -= 1
-                        continue
-                    j = (block + 1) << (FAN_BITS * level)
-                else:
-                    stop = until + 1 if top == 0 else min((j | (FAN - 1)) + 1, until + 1)
-                    while j < stop:
-                        if j == tried:
-                            j += 1
-                            continue
-                        at = inf
-                        if table[j, 7] < 0.0 and begin < j < finish:
-                            d_v2, share = nearest_on_line(table, j, x, y, z, 0.0, 1.0)
-                            if d_v2 <= best:
-                                at = table[j, 8] + share * table[j, 9]
-                        elif box_distance_v2(boxes, j, x, y, z) <= limit:
-                            d_v2, at = nearest_on_segment(
-                                table, arcs, j, x, y, z, window_low, window_high, limit
-                            )
-                        else:
-                            d_v2 = inf
-                        if d_v2 < best or (
-                            d_v2 == best and (at < best_place or (at == best_place and j < foot))
-                        ):
-                            best, best_place, foot = d_v2, at, j
-                            if best < bound:
-                                bound, limit = best, reach(best)
+        limit = reach(bound)
+        top = 1  # boxes larger than half the window tell nothing
+        while top < levels and (2 << (FAN_BITS * (top + 1))) <= finish - begin:
+            top += 1
+        j, level = begin, top
+        while j <= finish:
+            if level > 0:
+                block = j >> (FAN_BITS * level)
+                if box_distance_v2(tree, first[level - 1] + block, x, y, z) <= limit:
+                    level -= 1
+                    continue
+                j = (block + 1) << (FAN_BITS * level)
+            else:
+                stop = min((j | (FAN - 1)) + 1, finish + 1)
+                while j < stop:
+                    if j == tried:
                         j += 1
-                    level = min(1, top)
-                while level < top and j & ((1 << (FAN_BITS * (level + 1))) - 1) == 0:
-                    level += 1  # the largest box that begins here
+                        continue
+                    at = inf
+                    if table[j, 7] < 0.0 and begin < j < finish:
+                        d_v2, share = nearest_on_line(table, j, x, y, z, 0.0, 1.0)
+                        if d_v2 <= best:
+                            at = table[j, 8] + share * table[j, 9]
+                    elif box_distance_v2(boxes, j, x, y, z) <= limit:
+                        d_v2, at = nearest_on_segment(table, arcs, j, x, y, z, window_low, window_high, limit)
+                    else:
+                        d_v2 = inf
+                    if d_v2 < best or (d_v2 == best and (at < best_place or (at == best_place and j < foot))):
+                        best, best_place, foot = d_v2, at, j
+                        if best < bound:
+                            bound, limit = best, reach(best)
+                    j += 1
+                level = 1
+            while level < top and j & ((1 << (FAN_BITS * (level + 1))) - 1) == 0:
+                level += 1  # the largest box that begins here
         distance[k], segment[k] = sqrt(best), foot
         place[k] = min(max(best_place, window_low), window_high)
         advance = foot - before

@@ -28,6 +28,7 @@ from cnc_shape.readers.source import Bytes, Source, as_bytes, blocks, line_at, t
 from cnc_shape.tools import Tool
 
 _LEFT_OVER = frozenset("NFSTO")
+LONGEST_WAIT = 64  # lines, before compiled code is tried again where it did not take any
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,12 +248,16 @@ def interpret(
     """
     machine = Interpreter(source, survey, options)
     compiled = source.size >= compiled_from
+    readable, wait = 0, 1  # lines to go before compiled code is tried again, and after how many the next time
     for block in blocks(source):
         text = as_bytes(block)
         at = 0
         while at < len(block):
-            if compiled:
-                at = machine.take_plain_lines(text, at, rows)
+            if compiled and readable == 0:
+                stop = machine.take_plain_lines(text, at, rows)
+                wait = 1 if stop > at else min(2 * wait, LONGEST_WAIT)
+                at, readable = stop, wait
+            readable -= 1
             if at < len(block) and len(machine.rows) < rows:
                 line = line_at(block, at)
                 machine.take_line(line)
