@@ -31,6 +31,8 @@ def polyline(source: str, axes: tuple[str, ...], points: FloatArray, line: IntAr
     """Straight feeds from the first of `points` (n,d) through the others, as fast as the axes can."""
     count = len(points) - 1
     nan = frozen(np.full(count, np.nan))
+    normal = np.zeros((count, 3))
+    normal[:, 2] = 1.0
     return Program(
         source=source,
         axes=axes,
@@ -38,7 +40,7 @@ def polyline(source: str, axes: tuple[str, ...], points: FloatArray, line: IntAr
         motion=frozen_integers(np.full(count, int(Motion.FEED))),
         target=frozen(points[1:]),
         center=frozen(np.zeros((count, 3))),
-        normal=frozen(np.tile([0.0, 0.0, 1.0], (count, 1))),
+        normal=frozen(normal),
         sweep=frozen(np.zeros(count)),
         feed_rate=frozen(np.full(count, np.inf)),
         dwell=frozen(np.zeros(count)),
