@@ -72,6 +72,13 @@ class Program:
         return self.target[-1] if len(self) else self.start
 
 
+def vertical_normals(count: int) -> FloatArray:
+    """Normals of moves that are no arcs, (count,3): along z."""
+    normal = np.zeros((count, 3))
+    normal[:, 2] = 1.0
+    return normal
+
+
 _COLUMNS = (
     "motion", "target", "center", "normal", "sweep", "feed_rate", "dwell", "path_mode", "path_tolerance",
     "merge_tolerance", "line",

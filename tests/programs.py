@@ -11,56 +11,39 @@ from cnc_shape.errors import ProgramError
 from cnc_shape.program import Program, concatenate
 from cnc_shape.readers import ReadingOptions, read_program
 from cnc_shape.readers.gcode import GcodeOptions, interpret, survey
-from cnc_shape.readers.source import CHUNK_ROWS, COMPILED_FROM, ReadingLimits, Source
+from cnc_shape.readers.source import ReadingLimits, Source
 
 DEFAULT = GcodeOptions()
-LIMITS = ReadingLimits()
+AS_USUAL = ReadingOptions()
 COLUMNS = [name for name in Program.__slots__ if name not in ("source", "axes", "notes")]
 
 
-def from_memory(text: str | bytes, limits: ReadingLimits = LIMITS, name: str = "part.nc") -> Source:
+def from_memory(text: str | bytes, limits: ReadingLimits = AS_USUAL.limits, name: str = "part.nc") -> Source:
     """Text as a source."""
     data = text.encode() if isinstance(text, str) else text
     return Source(name, io.BytesIO(data), limits, len(data))
 
 
 def chunks(
-    text: str | bytes,
-    options: GcodeOptions = DEFAULT,
-    *,
-    rows: int = CHUNK_ROWS,
-    compiled_from: int = COMPILED_FROM,
-    limits: ReadingLimits = LIMITS,
+    text: str | bytes, options: GcodeOptions = DEFAULT, *, how: ReadingOptions = AS_USUAL
 ) -> list[Program]:
     """Read G-code from memory, as chunks."""
-    source = from_memory(text, limits)
+    source = from_memory(text, how.limits)
     seen = survey(source, options.dialect)
-    return list(interpret(source, seen, options, rows=rows, compiled_from=compiled_from))
+    return list(interpret(source, seen, options, rows=how.rows, compiled_from=how.compiled_from))
 
 
-def read(
-    text: str | bytes,
-    options: GcodeOptions = DEFAULT,
-    *,
-    rows: int = CHUNK_ROWS,
-    compiled_from: int = COMPILED_FROM,
-    limits: ReadingLimits = LIMITS,
-) -> Program:
+def read(text: str | bytes, options: GcodeOptions = DEFAULT, *, how: ReadingOptions = AS_USUAL) -> Program:
     """Read G-code from memory."""
-    return concatenate(chunks(text, options, rows=rows, compiled_from=compiled_from, limits=limits))
+    return concatenate(chunks(text, options, how=how))
 
 
 def attempt(
-    text: str | bytes,
-    options: GcodeOptions = DEFAULT,
-    *,
-    rows: int = CHUNK_ROWS,
-    compiled_from: int = COMPILED_FROM,
-    limits: ReadingLimits = LIMITS,
+    text: str | bytes, options: GcodeOptions = DEFAULT, *, how: ReadingOptions = AS_USUAL
 ) -> Program | ProgramError:
     """Read G-code from memory; a refusal is an answer too."""
     try:
-        return read(text, options, rows=rows, compiled_from=compiled_from, limits=limits)
+        return read(text, options, how=how)
     except ProgramError as error:
         return error
 

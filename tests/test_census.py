@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from programs import chunks
 
 from cnc_shape.census import Census, count
+from cnc_shape.readers import ReadingOptions
 from cnc_shape.writers.points import points_file, points_of
 
 PART = """G21 G90 F600
@@ -26,7 +27,7 @@ M2
 
 def census(text: str, rows: int = 1000) -> Census:
     state = None
-    for chunk in chunks(text, rows=rows):
+    for chunk in chunks(text, how=ReadingOptions(rows=rows)):
         state = count(state, chunk)
     assert state is not None
     return state
@@ -70,7 +71,9 @@ def test_chunks_of_any_size_give_the_same_bits(rows):
 
 
 def test_points_are_in_the_units_of_the_door():
-    file = np.load(io.BytesIO(points_file([points_of(part) for part in chunks(PART, rows=2)])))
+    file = np.load(
+        io.BytesIO(points_file([points_of(part) for part in chunks(PART, how=ReadingOptions(rows=2))]))
+    )
     assert file["kind"].tolist() == [0, 1, 2, 1, 1]  # the dwell is no move
     assert file["line"].tolist() == [2, 3, 4, 6, 7]
     assert_allclose(file["end"][-1], [-10, 30, 0, 90, 0, 0], atol=1e-12)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import DEFAULT, LIMITS, assert_same, attempt, attempt_file, chunks, read
+from programs import AS_USUAL, DEFAULT, assert_same, attempt, attempt_file, chunks, read
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import concatenate
@@ -27,9 +27,10 @@ def assert_equal_answers(one, other):
         assert one.notes == other.notes
 
 
-def assert_two_ways_agree(text, options=DEFAULT, rows=CHUNK_ROWS, limits=LIMITS):
+def assert_two_ways_agree(text, options=DEFAULT, rows=CHUNK_ROWS, limits=AS_USUAL.limits):
     compiled, readable = (
-        attempt(text, options, rows=rows, compiled_from=length, limits=limits) for length in (ALWAYS, NEVER)
+        attempt(text, options, how=ReadingOptions(rows=rows, compiled_from=length, limits=limits))
+        for length in (ALWAYS, NEVER)
     )
     assert_equal_answers(compiled, readable)
 
@@ -88,27 +89,29 @@ def test_limits_are_hit_at_the_same_line(text, blocks, line_bytes):
 
 def test_pieces_of_any_size(monkeypatch):
     text = "G1 F100 X0\nX1 Y2\n(a) X2\nG3 X4 Y2 I1\nG1 X7\nG1 X9.125\n\n\nG4 P1\nX1"
-    whole = read(text, compiled_from=NEVER)
+    whole = read(text, how=ReadingOptions(compiled_from=NEVER))
     for end in ("\n", "\r\n", "\r"):
         for size in range(1, len(text) + 2):
             monkeypatch.setattr(source, "BLOCK_BYTES", size)
-            assert_same(read(text.replace("\n", end), compiled_from=ALWAYS), whole)
+            assert_same(read(text.replace("\n", end), how=ReadingOptions(compiled_from=ALWAYS)), whole)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 1000, 20_000, 10**9])
 def test_chunks_of_any_size(rows):
     count = 300 if rows < 100 else 40_000
     program = "F100 G0 X0\n" + "".join(f"G1 X{k * 0.37:.3f} Y{k % 7}\n" for k in range(count))
-    parts = chunks(program, compiled_from=ALWAYS, rows=rows)
+    parts = chunks(program, how=ReadingOptions(compiled_from=ALWAYS, rows=rows))
     assert all(len(part) == rows for part in parts[:-1])
-    assert_same(concatenate(parts), read(program, compiled_from=NEVER))
+    assert_same(concatenate(parts), read(program, how=ReadingOptions(compiled_from=NEVER)))
 
 
 def test_numbers_are_floats_to_the_last_bit():
     values = np.random.default_rng(3).normal(scale=200.0, size=4000).tolist()
     forms = [lambda v: f"{v:.3f}", lambda v: f"{v:.15f}", repr, lambda v: f"{v:.9f}", lambda v: f"{v:.0f}"]
     texts = [forms[k % len(forms)](value) for k, value in enumerate(values)]
-    program = read("G1 F100 X0\n" + "".join(f"X{x}\n" for x in texts), compiled_from=ALWAYS)
+    program = read(
+        "G1 F100 X0\n" + "".join(f"X{x}\n" for x in texts), how=ReadingOptions(compiled_from=ALWAYS)
+    )
     np.testing.assert_array_equal(program.target[1:, 0], [float(text) for text in texts])
 
 

@@ -14,6 +14,7 @@ from programs import DEFAULT, assert_same, attempt, chunks, from_memory, message
 
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import Motion, PathMode
+from cnc_shape.readers import ReadingOptions
 from cnc_shape.readers.gcode import Dialect, GcodeOptions
 from cnc_shape.readers.source import ReadingLimits
 from cnc_shape.toolpath import travel_lengths
@@ -338,7 +339,7 @@ def test_what_is_refused_and_where(text, column, reason):
 )
 def test_limits_are_named_when_hit(limits, text, reason):
     with pytest.raises(ProgramError, match=reason):
-        read(text, limits=limits)
+        read(text, how=ReadingOptions(limits=limits))
 
 
 # dialects
@@ -440,13 +441,13 @@ LONG = LONG.replace("G3 X3 I.5 J.2", "G3 X3 Y1 I.5")
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 1000])
 def test_chunks_of_any_size_hold_the_same_bits(rows):
-    whole = read(LONG, rows=10**9)
-    parts = chunks(LONG, rows=rows)
+    whole = read(LONG, how=ReadingOptions(rows=10**9))
+    parts = chunks(LONG, how=ReadingOptions(rows=rows))
     assert len(parts) > 1 or rows == 1000
     assert all(len(part) == rows for part in parts[:-1])
     for before, after in pairwise(parts):
         np.testing.assert_array_equal(before.end, after.start)
-    assert_same(read(LONG, rows=rows), whole)
+    assert_same(read(LONG, how=ReadingOptions(rows=rows)), whole)
 
 
 ANY_TEXT = st.text(alphabet="GMXYZABCIJKRPQFSTNOHE0123456789.-+ ()%;/#[]\n\t$*=", max_size=120)

@@ -13,7 +13,7 @@ from paths import arc, dwell, line, program
 from programs import chunks, read
 
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.readers import read_program
+from cnc_shape.readers import ReadingOptions, read_program
 from cnc_shape.toolpath import Toolpath, build_toolpath, building, check_travel, extent, travel_lengths
 
 
@@ -114,7 +114,7 @@ def test_a_streamed_toolpath_has_the_bits_of_the_whole(rows):
     )
     whole = build_toolpath(read(text))
     step, state, parts = building(), None, []
-    pieces = chunks(text, rows=rows)
+    pieces = chunks(text, how=ReadingOptions(rows=rows))
     for number, piece in enumerate(pieces):
         state, part = step(state, piece, number == len(pieces) - 1)
         parts.append(part)

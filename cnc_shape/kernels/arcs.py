@@ -34,18 +34,12 @@ NODE_2, WEIGHT_2 = 0.3399810435848563, 0.6521451548625461
 
 
 @kernel
-def beyond(d_v2):
-    """A distance a little above sqrt(d_v2), mm: farther away, no rounding makes anything nearer.
+def reach(d_v2):
+    """Square of a distance a little above sqrt(d_v2), mm^2: beyond it, no rounding makes anything nearer.
 
     Coordinates are below 1e6 mm, so distances are rounded by less than 1e-9 mm.
     """
-    return sqrt(d_v2) * (1.0 + 1e-12) + 1e-9
-
-
-@kernel
-def reach(d_v2):
-    """Square of `beyond`, mm^2."""
-    return beyond(d_v2) ** 2
+    return (sqrt(d_v2) * (1.0 + 1e-12) + 1e-9) ** 2
 
 
 @kernel

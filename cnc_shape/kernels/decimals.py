@@ -45,6 +45,22 @@ def quotient(whole, power):
 
 
 @kernel
+def skip_blanks(text, at):
+    """Return the place of the first byte from `at` on that is no space and no tab."""
+    while at < text.size and (text[at] == SPACE or text[at] == TAB):
+        at += 1
+    return at
+
+
+@kernel
+def sign_at(text, at):
+    """Return whether a minus stands at `at`, and the place behind the sign, if there is one."""
+    if at < text.size and (text[at] == MINUS or text[at] == PLUS):
+        return text[at] == MINUS, at + 1
+    return False, at
+
+
+@kernel
 def decimal(text, at, blanks, exponents):
     """Read a number of `text` (n,) bytes from `at` on.
 
@@ -52,12 +68,9 @@ def decimal(text, at, blanks, exponents):
     be told here. `blanks`: spaces and tabs may stand inside; `exponents`: ``e-3`` may follow.
     """
     size = text.size
-    while blanks and at < size and (text[at] == SPACE or text[at] == TAB):
-        at += 1
-    negative = False
-    if at < size and (text[at] == MINUS or text[at] == PLUS):
-        negative = text[at] == MINUS
-        at += 1
+    if blanks:
+        at = skip_blanks(text, at)
+    negative, at = sign_at(text, at)
     whole = 0
     places = 0  # behind the point
     step = 0  # of places, 1 behind the point
@@ -79,11 +92,7 @@ def decimal(text, at, blanks, exponents):
     if not digits:
         return 0.0, at, False
     if exponents and at < size and (text[at] == SMALL_E or text[at] == CAPITAL_E):
-        at += 1
-        down = False
-        if at < size and (text[at] == MINUS or text[at] == PLUS):
-            down = text[at] == MINUS
-            at += 1
+        down, at = sign_at(text, at + 1)
         exponent = 0
         digits = False
         while at < size and ZERO <= text[at] <= NINE:

@@ -2,17 +2,9 @@
 """Plain rows of a table, straight from its bytes: numbers between commas."""
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.decimals import SPACE, TAB, decimal
+from cnc_shape.kernels.decimals import decimal, skip_blanks
 
 LINE_END, COMMA = ord("\n"), ord(",")
-
-
-@kernel
-def skip_blanks(text, at):
-    """Return the place of the first byte from `at` on that is no space and no tab."""
-    while at < text.size and (text[at] == SPACE or text[at] == TAB):
-        at += 1
-    return at
 
 
 @kernel

@@ -119,6 +119,7 @@ def read_rows(source: Source, header: Header, *, rows: int, compiled_from: int) 
     """
     readable = _RowReader(source, header)
     compiled = source.size >= compiled_from
+    rows = min(rows, source.size)  # there cannot be more
     values, line = np.empty((rows, len(header.names))), np.empty(rows, dtype=np.int64)
     count = number = 0
     ahead = True  # the header is still to come

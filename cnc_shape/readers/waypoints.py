@@ -9,7 +9,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import ProgramError
-from cnc_shape.program import XYZ, Motion, Note, PathMode, Program
+from cnc_shape.program import XYZ, Motion, Note, PathMode, Program, vertical_normals
 from cnc_shape.readers.source import Source
 from cnc_shape.readers.table import FEED, Header, Rows, join_rows, read_rows
 from cnc_shape.toolpath import rotary_travel, travel_lengths
@@ -31,8 +31,6 @@ def polyline(source: str, axes: tuple[str, ...], points: FloatArray, line: IntAr
     """Straight feeds from the first of `points` (n,d) through the others, as fast as the axes can."""
     count = len(points) - 1
     nan = frozen(np.full(count, np.nan))
-    normal = np.zeros((count, 3))
-    normal[:, 2] = 1.0
     return Program(
         source=source,
         axes=axes,
@@ -40,7 +38,7 @@ def polyline(source: str, axes: tuple[str, ...], points: FloatArray, line: IntAr
         motion=frozen_integers(np.full(count, int(Motion.FEED))),
         target=frozen(points[1:]),
         center=frozen(np.zeros((count, 3))),
-        normal=frozen(normal),
+        normal=frozen(vertical_normals(count)),
         sweep=frozen(np.zeros(count)),
         feed_rate=frozen(np.full(count, np.inf)),
         dwell=frozen(np.zeros(count)),

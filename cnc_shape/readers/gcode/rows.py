@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.program import ROTARY, XYZ, Motion, Note, Program
+from cnc_shape.program import ROTARY, XYZ, Motion, Note, Program, vertical_normals
 from cnc_shape.readers.gcode.modal import AXES, Modal
 from cnc_shape.readers.source import CHUNK_ROWS
 from cnc_shape.toolpath import rotary_travel, travel_lengths
@@ -123,8 +123,7 @@ def to_program(rows: Rows, source: str, axes: tuple[str, ...], start: FloatArray
     target = columns.target[:, : len(XYZ)]
     if rotary:
         target = np.hstack([target, columns.target[:, rotary] * DEGREE])
-    center, normal, sweep = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count)
-    normal[:, 2] = 1.0
+    center, normal, sweep = np.zeros((count, 3)), vertical_normals(count), np.zeros(count)
     if rows.arcs:
         index = [arc[0] for arc in rows.arcs]
         center[index] = [arc[1] for arc in rows.arcs]
