@@ -29,6 +29,9 @@ class CncShapeError(Exception):
         Name of the file the error speaks of, or None.
     line, column
         1-based place in `source`, or None.
+    argument
+        Parameter of the Python function that is wrong, ``max_amplitude``, or None: whoever knows where its
+        value came from says so (an option of the command line, a key of the machine file).
     """
 
     code = "error"
@@ -41,6 +44,7 @@ class CncShapeError(Exception):
         source: str | None = None,
         line: int | None = None,
         column: int | None = None,
+        argument: str | None = None,
     ) -> None:
         super().__init__(reason)
         self.reason = reason
@@ -48,6 +52,7 @@ class CncShapeError(Exception):
         self.source = source
         self.line = line
         self.column = column
+        self.argument = argument
 
     def __str__(self) -> str:
         place = [str(part) for part in (self.source, self.line, self.column) if part is not None]

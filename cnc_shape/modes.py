@@ -28,7 +28,8 @@ class Mode:
     natural_frequency: float  # Hz, undamped
     damping_ratio: float  # -, 0 <= zeta < 1
     participation: float = 1.0  # -, share of the drive's acceleration that excites the mode
-    frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative; unused as yet
+    frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative
+    damping_uncertainty: float = 0.0  # -, how far off the damping ratio may be, relative
 
     def __post_init__(self) -> None:
         if (
@@ -52,10 +53,19 @@ class Mode:
             )
         if not isfinite(self.participation):
             raise OptionError(f"a mode's participation must be finite, not {self.participation}")
-        if not 0.0 <= self.frequency_uncertainty < 1.0:
+        for name, value in (
+            ("frequency", self.frequency_uncertainty),
+            ("damping", self.damping_uncertainty),
+        ):
+            if not 0.0 <= value < 1.0:
+                raise OptionError(
+                    f"a {name} uncertainty must be at least 0 and below 1, not {value}",
+                    hint="0.03 means 3 per cent up or down",
+                )
+        if self.damping_ratio * (1.0 + self.damping_uncertainty) >= 1.0:
             raise OptionError(
-                f"a frequency uncertainty must be at least 0 and below 1, not {self.frequency_uncertainty}",
-                hint="0.03 means 3 per cent up or down",
+                f"a damping ratio of {self.damping_ratio:g} that is {self.damping_uncertainty:.0%} off reaches 1",
+                hint="a shaper is for a mode that swings: damping below 1",
             )
 
     @property

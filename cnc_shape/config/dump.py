@@ -112,6 +112,8 @@ def _mode(mode: Mode) -> dict[str, object]:
     }
     if mode.frequency_uncertainty:
         keys["frequency_uncertainty"] = mode.frequency_uncertainty
+    if mode.damping_uncertainty:
+        keys["damping_uncertainty"] = mode.damping_uncertainty
     return keys
 
 

@@ -193,6 +193,7 @@ def _modes(source: str, tree: Tree, axis: str, models: list[ModeModel]) -> tuple
             model.damping_ratio,
             share if model.participation is None else model.participation,
             model.frequency_uncertainty,
+            model.damping_uncertainty,
         )
         for model in models
     )

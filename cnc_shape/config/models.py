@@ -83,6 +83,7 @@ class ModeModel(Strict):
     damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)]
     participation: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     frequency_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    damping_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
 
 
 class _AxisModel(Strict):
