@@ -64,7 +64,7 @@ class Mode:
                 )
         if self.damping_ratio * (1.0 + self.damping_uncertainty) >= 1.0:
             raise OptionError(
-                f"a damping ratio of {self.damping_ratio:g} that is {self.damping_uncertainty:.0%} off reaches 1",
+                f"a damping ratio of {self.damping_ratio:g} is 1 when {self.damping_uncertainty:.0%} off",
                 hint="a shaper is for a mode that swings: damping below 1",
             )
 

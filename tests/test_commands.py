@@ -159,7 +159,7 @@ def test_simulate_reads_standard_input(place):
             ["design", "zv", "--frequency-hz", "3", "--damping-ratio", "0", "--damping-ratio", "0"],
             "1 frequencies but 2",
         ),
-        (["design", "cascade", "--frequency-hz", "3", "--of", "ei"], "zv or zvd, not 'ei'"),
+        (["design", "cascade", "--frequency-hz", "3", "--of", "sd"], "not 'sd'"),
         (["design", "zv", "--frequency-hz", "3", "--vibration-tolerance", "2"], "between 0 and 1, not 2.0"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -22,10 +22,10 @@ from cnc_shape.config.models import (
     RotaryAxisModel,
 )
 from cnc_shape.config.setup import Planning, Setup, ShaperChoice, Shaping
-from cnc_shape.config.shaper_options import NONE, design
-from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, read_tree, refuse
+from cnc_shape.config.shaper_options import NONE, design, key_of
+from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refuse
 from cnc_shape.controllers import Control, CrossCoupling, Feedforward
-from cnc_shape.errors import ConfigError, OptionError
+from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive, Machine
 from cnc_shape.modes import Mode
@@ -214,8 +214,10 @@ def _shaper(source: str, tree: Tree, axis: Axis, choice: ShaperChoice) -> Shaper
         refuse(source, place, reason, "add modes: to the axis, or remove the shaper")
     try:
         return design(choice, axis.modes)
-    except OptionError as error:
-        refuse(source, place, f"axes.{axis.name}.shaper: {error.reason}", error.hint)
+    except (OptionError, InfeasibleError) as error:
+        key = key_of(error.argument)
+        place, walked = locate(tree, path if key is None else (*path, key))
+        refuse(source, place, f"{dotted(walked)}: {error.reason}", error.hint)
 
 
 def _control(model: ControlModel) -> Control:

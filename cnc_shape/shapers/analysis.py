@@ -36,10 +36,17 @@ def residual_vibration(shaper: Shaper, mode: Mode, frequency_ratio: FloatArray |
     cannot overflow. `frequency_ratio` is actual over modelled frequency: the shaper stays as designed.
     """
     omega = mode.omega * np.asarray(frequency_ratio, dtype=np.float64)
-    damped = mode.omega_damped / mode.omega
-    s = omega[..., None] * (
-        mode.damping_ratio * (shaper.times - shaper.duration) + 1j * damped * shaper.times
-    )
+    return vibration(shaper, omega, mode.damping_ratio)
+
+
+def vibration(shaper: Shaper, omega: FloatArray | float, damping_ratio: FloatArray | float) -> FloatArray:
+    """V of an oscillator of undamped angular frequency `omega`, rad/s, whatever the shaper was made for.
+
+    `omega` and `damping_ratio` may be of any shapes that broadcast: on a grid of both V is the surface of
+    paper 000, Fig. 4.
+    """
+    w, zeta = np.asarray(omega, dtype=np.float64)[..., None], np.asarray(damping_ratio)[..., None]
+    s = w * (zeta * (shaper.times - shaper.duration) + 1j * np.sqrt(1.0 - zeta**2) * shaper.times)
     return np.abs(np.exp(s) @ shaper.amplitudes)
 
 
