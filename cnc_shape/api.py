@@ -13,7 +13,8 @@ from cnc_shape.pipeline import Run, default_cases, pick_cases, run
 from cnc_shape.readers import ReadingOptions
 from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.report import folder as run_folder
-from cnc_shape.report.figures import Format, path_figure
+from cnc_shape.report.figures import path_figure
+from cnc_shape.report.style import Format
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,6 +16,7 @@ from runs import MODE, make_run, shaper
 from cnc_shape.arrays import frozen
 from cnc_shape.report import figures
 from cnc_shape.report.shaper_figure import shaper_figure
+from cnc_shape.report.style import render
 
 RUN = make_run(2000)
 SHAPERS = {"x": shaper(), "y": shaper()}
@@ -31,9 +32,9 @@ DRAW = {
 @pytest.mark.parametrize("name", DRAW)
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
 def test_a_figure_drawn_twice_is_the_same_to_the_byte(name, kind):
-    first = figures.render(DRAW[name](RUN), kind)
+    first = render(DRAW[name](RUN), kind)
     with mpl.rc_context({"font.size": 20.0, "lines.linewidth": 9.0, "svg.hashsalt": "other"}):
-        second = figures.render(DRAW[name](RUN), kind)
+        second = render(DRAW[name](RUN), kind)
     assert first == second
     assert b"20" + b"26-" not in first  # no date
 
@@ -48,7 +49,7 @@ def test_every_axis_carries_its_unit(name):
 
 def test_svg_holds_no_font_and_no_reference_outside():
     for draw in DRAW.values():
-        svg = figures.render(draw(RUN), "svg").decode()
+        svg = render(draw(RUN), "svg").decode()
         assert "<text" not in svg
         assert "script" not in svg
         assert not re.search(r'href="(?!#)', svg)
@@ -76,7 +77,7 @@ def test_few_and_many_samples_are_drawn_with_the_worst_in_them(samples):
             assert np.max(line.get_ydata()) == worst / 1e-3
             assert len(line.get_ydata()) <= 2 * figures.DRAWN + 2
     for draw in DRAW.values():
-        assert len(figures.render(draw(run), "svg")) < 1_500_000
+        assert len(render(draw(run), "svg")) < 1_500_000
 
 
 def test_the_magnified_tool_is_as_far_off_as_the_legend_says():
@@ -110,14 +111,14 @@ def test_flat_and_empty_paths_are_drawn(shape):
         for s in RUN.signals
     ]
     run = replace(RUN, path=frozen(RUN.path * shape), signals=tuple(flat))
-    assert figures.render(figures.path_figure(run), "png")
+    assert render(figures.path_figure(run), "png")
 
 
 def test_axes_with_one_shaper_share_a_row():
     assert len(shaper_figure(SHAPERS, MODES).axes) == 2
     other = {**SHAPERS, "z": replace(shaper(), times=frozen([0.0, 0.01]))}
     assert len(shaper_figure(other, {**MODES, "z": ()}).axes) == 4
-    first, second = (figures.render(shaper_figure(SHAPERS, MODES), "svg") for _ in range(2))
+    first, second = (render(shaper_figure(SHAPERS, MODES), "svg") for _ in range(2))
     assert first == second
 
 
@@ -126,7 +127,7 @@ def test_what_the_structure_does_after_the_end_is_drawn_and_may_be_nothing():
     for line, signals in zip(rest.lines, RUN.signals, strict=True):
         assert np.max(np.abs(line.get_ydata())) in np.abs(signals.settling).max(axis=0) / 1e-3
     still = [replace(s, settling_time=frozen([]), settling=frozen(np.zeros((0, 3)))) for s in RUN.signals]
-    assert figures.render(figures.vibration_figure(replace(RUN, signals=tuple(still))), "png")
+    assert render(figures.vibration_figure(replace(RUN, signals=tuple(still))), "png")
 
 
 def test_no_title_of_a_path_is_cut():

@@ -18,6 +18,7 @@ from runs import MODE, TEXT, make_run, shaper
 
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.style import render
 from cnc_shape.report.table import columns
 from cnc_shape.report.words import verdict
 
@@ -54,7 +55,7 @@ class Reader(HTMLParser):
 
 
 def page_of(run=RUN, **changes) -> str:
-    drawn = {"path": figures.render(figures.path_figure(RUN), "svg")}
+    drawn = {"path": render(figures.path_figure(RUN), "svg")}
     return render_html(run, Page(drawn, {"x": shaper()}, {"x": (MODE,)}, **changes))
 
 

@@ -1,154 +1,120 @@
-"""``cnc-shape design``: one shaper, its impulses and what it does."""
+"""``cnc-shape design``: a shaper for every axis, or all shapers compared."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from cnc_shape.cli.options import Force, Json, Machine, Quiet
 
-    from cnc_shape.modes import Mode
-    from cnc_shape.shapers import Shaper
+Number = float | None
+Numbers = list[float] | None
 
 
 def design(
-    shaper: Annotated[str, typer.Argument(metavar="SHAPER", help="zv, zvd or cascade.")],
+    shaper: Annotated[
+        str | None, typer.Argument(metavar="[SHAPER]", help="Its name; without one, all are compared.")
+    ] = None,
     frequency_hz: Annotated[
-        list[float] | None, typer.Option(help="Undamped natural frequency of a mode; repeat for several.")
+        Numbers, typer.Option(help="Undamped natural frequency of a mode; repeat for several.")
     ] = None,
     damping_ratio: Annotated[
-        list[float] | None, typer.Option(help="Damping ratio of a mode, in the order of the frequencies.")
+        Numbers, typer.Option(help="Damping ratio of a mode, in the order of the frequencies.")
     ] = None,
-    machine: Annotated[
-        str | None,
+    frequency_uncertainty: Annotated[
+        Numbers,
+        typer.Option(help="How far off a frequency may be, relative: 0.1; for each mode, or one for all."),
+    ] = None,
+    damping_uncertainty: Annotated[
+        Numbers,
+        typer.Option(help="How far off a damping ratio may be, relative; for each mode, or one for all."),
+    ] = None,
+    machine: Machine = None,
+    duration_s: Annotated[Number, typer.Option(help="sd, virtual_mode: time of the last impulse.")] = None,
+    duration_periods: Annotated[
+        Number, typer.Option(help="sd, virtual_mode, mzv: the same in damped periods of the mode.")
+    ] = None,
+    virtual_frequency_hz: Annotated[
+        Number, typer.Option(help="virtual_mode: the mode that is not there; higher is shorter.")
+    ] = None,
+    max_amplitude: Annotated[
+        Number, typer.Option(help="sd, multi_mode, optimal, virtual_mode: largest impulse.")
+    ] = None,
+    min_gap_s: Annotated[Number, typer.Option(help="sd: least time between two impulses.")] = None,
+    metric: Annotated[
+        str | None, typer.Option(help="sd: what is to be largest, insensitivity or margin.")
+    ] = None,
+    positive: Annotated[
+        bool, typer.Option("--positive", help="sd, multi_mode, optimal: no negative impulses.")
+    ] = False,
+    derivatives: Annotated[
+        list[int] | None,
+        typer.Option(help="zv, multi_mode, optimal: derivatives of V that vanish, too; for each mode."),
+    ] = None,
+    impulses: Annotated[int | None, typer.Option(help="mzv: how many impulses.")] = None,
+    of: Annotated[
+        str | None, typer.Option(help="cascade: the shaper of one mode that it is made of.")
+    ] = None,
+    min_running_sum: Annotated[
+        Number, typer.Option(help="optimal: least value that a shaped step may take.")
+    ] = None,
+    max_running_sum: Annotated[
+        Number, typer.Option(help="optimal: largest value that a shaped step may take.")
+    ] = None,
+    max_sum_abs_amplitude: Annotated[
+        Number, typer.Option(help="optimal: largest sum |A|, which bounds the demand of any motion.")
+    ] = None,
+    times_s: Annotated[Numbers, typer.Option(help="impulses: time of an impulse; repeat.")] = None,
+    amplitudes: Annotated[Numbers, typer.Option(help="impulses: amplitude of an impulse; repeat.")] = None,
+    vibration_tolerance: Annotated[
+        Number,
+        typer.Option(help="Vibration that may be left, relative: 0.05; of ei, sd, optimal and all bands."),
+    ] = None,
+    corner_speed_mm_s: Annotated[
+        float, typer.Option(help="Speed at which the corner is taken whose smoothing is told.")
+    ] = 5.0,
+    corner_tolerance_mm: Annotated[
+        Number,
         typer.Option(
-            "-m", "--machine", envvar="CNC_SHAPE_MACHINE", help="Machine file: a shaper for each axis."
+            help="Of a corner with a stop; the tolerance of the machine's path, or 0.05.", show_default=False
         ),
     ] = None,
-    of: Annotated[str, typer.Option(help="Single-mode shaper that a cascade is made of.")] = "zv",
-    vibration_tolerance: Annotated[
-        float, typer.Option(help="Residual vibration that the insensitivity is told for.")
-    ] = 0.05,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    sensitivity: Annotated[
+        bool, typer.Option("--sensitivity", help="JSON: V over frequency and damping, too.")
+    ] = False,
+    plot: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Draw the shaper, or the comparison: .png, .svg, .pdf.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
-    """Design an input shaper for one or several modes."""
-    from cnc_shape.cli.output import print_json, print_text
-    from cnc_shape.errors import OptionError
-    from cnc_shape.modes import Mode
-    from cnc_shape.shapers import MULTI_MODE, SINGLE_MODE, cascade
+    """Design input shapers: one for every axis of a machine or for given modes, or compare all.
 
-    known = [*SINGLE_MODE, *MULTI_MODE]
-    if shaper not in known:
-        raise OptionError(
-            f"unknown shaper {shaper!r}", hint="the shapers built so far are " + ", ".join(known)
+    Shapers: zv zvd zvdd zvddd umzv mzv ei 2hump_ei 3hump_ei virtual_mode sd; for several modes cascade,
+    multi_mode and optimal; as firmwares compute them klipper_ei klipper_2hump_ei klipper_3hump_ei fitted_ei
+    duet_ei2 duet_ei3; and impulses of your own.
+    """
+    from cnc_shape.cli import designing
+
+    subjects, corner = designing.subjects_of(
+        frequency_hz or [], damping_ratio or [], frequency_uncertainty or [], damping_uncertainty or [],
+        machine, corner_speed_mm_s, corner_tolerance_mm,
+    )  # fmt: skip
+    options: dict[str, object] = {
+        "duration_s": duration_s, "duration_periods": duration_periods, "max_amplitude": max_amplitude,
+        "virtual_frequency_hz": virtual_frequency_hz, "min_gap_s": min_gap_s, "metric": metric,
+        "positive": positive or None, "derivatives": derivatives or None, "impulses": impulses, "of": of,
+        "min_running_sum": min_running_sum, "max_running_sum": max_running_sum,
+        "max_sum_abs_amplitude": max_sum_abs_amplitude, "times_s": times_s or None,
+        "amplitudes": amplitudes or None, "vibration_tolerance": vibration_tolerance,
+    }  # fmt: skip
+    given = {key: value for key, value in options.items() if value is not None}
+    drawing = designing.drawing_at(plot, force=force)
+    if shaper is None:
+        designing.compare_all(
+            subjects, given, corner, drawing, quiet=quiet, json=json, sensitivity=sensitivity
         )
-    if of not in SINGLE_MODE:
-        raise OptionError(
-            f"a cascade is made of {' or '.join(SINGLE_MODE)}, not {of!r}", hint="leave --of out for zv"
-        )
-    if of != "zv" and shaper != "cascade":
-        raise OptionError(f"--of belongs to cascade, not to {shaper}")
-    frequencies, dampings = frequency_hz or [], damping_ratio or []
-    if len(dampings) not in (0, len(frequencies)):
-        raise OptionError(
-            f"{len(frequencies)} frequencies but {len(dampings)} damping ratios",
-            hint="repeat --damping-ratio once for each --frequency-hz, or leave it out for undamped modes",
-        )
-    per_axis: list[tuple[str | None, tuple[Mode, ...]]] = []
-    if frequencies:
-        pairs = zip(frequencies, dampings or [0.0] * len(frequencies), strict=True)
-        share = 1.0 / len(frequencies)
-        per_axis.append((None, tuple(Mode(f, z, share) for f, z in pairs)))
     else:
-        per_axis.extend(_machine_modes(machine))
-    designs: list[dict[str, Any]] = []
-    for axis, modes in per_axis:
-        if shaper in SINGLE_MODE and len(modes) > 1:
-            raise OptionError(
-                f"{shaper} is for one mode, not {len(modes)}", hint="use cascade, or give one --frequency-hz"
-            )
-        made = (
-            SINGLE_MODE[shaper](next(iter(modes)))
-            if shaper in SINGLE_MODE
-            else cascade(modes, SINGLE_MODE[of])
-        )
-        options: dict[str, object] = {"of": of} if shaper == "cascade" else {}
-        designs.append(_describe(axis, shaper, made, modes, options, vibration_tolerance))
-    if json:
-        print_json("design", {"designs": designs})
-        return
-    for entry in designs:
-        print_text(_text(entry))
-
-
-def _machine_modes(machine: str | None) -> list[tuple[str | None, tuple[Mode, ...]]]:
-    from cnc_shape.config import load_machine
-    from cnc_shape.errors import OptionError
-
-    if machine is None:
-        raise OptionError("which mode?", hint="give --frequency-hz and --damping-ratio, or -m MACHINE")
-    axes = [(axis.name, axis.modes) for axis in load_machine(machine).machine.axes if axis.modes]
-    if not axes:
-        raise OptionError(
-            f"{machine} has no modes", hint="give an axis modes: [{frequency_hz: 30, damping_ratio: 0.02}]"
-        )
-    return list(axes)
-
-
-def _describe(
-    axis: str | None,
-    name: str,
-    shaper: Shaper,
-    modes: Sequence[Mode],
-    options: dict[str, object],
-    tolerance: float,
-) -> dict[str, Any]:
-    from cnc_shape.shapers.analysis import contour_factor, insensitivity, residual_vibration
-
-    band = insensitivity(shaper, modes, tolerance)
-    return {
-        "axis": axis,
-        "shaper": name,
-        "modes": [{"frequency_hz": m.natural_frequency, "damping_ratio": m.damping_ratio} for m in modes],
-        "options": options,
-        "times_s": shaper.times.tolist(),
-        "amplitudes": shaper.amplitudes.tolist(),
-        "duration_s": shaper.duration,
-        "delay_s": shaper.delay,
-        "residual_vibration": [float(residual_vibration(shaper, mode)) for mode in modes],
-        "sum_abs_amplitude": shaper.sum_abs_amplitude,
-        "max_running_sum": shaper.max_running_sum,
-        "contour_factor": contour_factor(shaper, modes),
-        "insensitivity": {
-            "tolerance": band.tolerance,
-            "low": band.low,
-            "high": band.high,
-            "width": band.width,
-            "margin": band.margin,
-        },
-    }
-
-
-def _text(entry: dict[str, Any]) -> str:
-    modes = ", ".join(f"{m['frequency_hz']:g} Hz (damping {m['damping_ratio']:g})" for m in entry["modes"])
-    band = entry["insensitivity"]
-    high = "∞" if band["high"] is None else f"{band['high']:.4f}"
-    impulses = "\n".join(
-        f"  {1e3 * t:10.4f} ms   {a:+.6f}" for t, a in zip(entry["times_s"], entry["amplitudes"], strict=True)
-    )
-    factor = entry["contour_factor"]
-    curve = "none: these modes do not bend" if factor is None else f"{factor:+.4f}"
-    where = f"{entry['axis']}: " if entry["axis"] else ""
-    return "\n".join(
-        (
-            f"{where}{entry['shaper']} for {modes}",
-            impulses,
-            f"  duration {1e3 * entry['duration_s']:.3f} ms, delay {1e3 * entry['delay_s']:.3f} ms",
-            f"  vibration left at the design point {max(entry['residual_vibration']):.1e}",
-            f"  at most {band['tolerance']:.0%} for {band['low']:.4f} to {high} of the modelled frequency",
-            f"  sum |A| {entry['sum_abs_amplitude']:.4f}, largest running sum {entry['max_running_sum']:.4f}",
-            f"  curve factor {curve} (tool error on a curve, of the unshaped one)",
-        )
-    )
+        designing.design_one(subjects, shaper, given, corner, drawing, json=json, sensitivity=sensitivity)

@@ -11,8 +11,8 @@ from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Force, Json, Mac
 
 if TYPE_CHECKING:
     from cnc_shape.pipeline import Run
-    from cnc_shape.report.figures import Format
     from cnc_shape.report.folder import Context
+    from cnc_shape.report.style import Format
 
 SAMPLE = "bracket.nc"
 

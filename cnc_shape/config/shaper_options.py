@@ -96,6 +96,17 @@ def key_of(argument: str | None) -> str | None:
     return None if argument is None else UNIT_NAMES.get(argument, argument)
 
 
+def as_given(name: str, values: Mapping[str, object]) -> dict[str, object]:
+    """Return arguments of the shaper's function as the options that a file would give: key: value."""
+    names = {function: word for word, function in PLAIN.items()}
+    options = {option.parameter: key for key, option in options_of(name).items()}
+    return {
+        options[parameter]: value.value if isinstance(value, Enum) else names.get(value, value)  # pyright: ignore[reportArgumentType, reportCallIssue]
+        for parameter, value in values.items()
+        if value is not None
+    }
+
+
 def options_model(name: str) -> type[ShaperModel]:
     """Return the model of ``{type: name, ...}`` whose keys are the options of the shaper."""
     fields: dict[str, Any] = {"type": (Literal[name], ...)}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.pipeline import Run
 from cnc_shape.program import ROTARY
 from cnc_shape.recording import Signals
-from cnc_shape.report.style import METADATA, PATH_COLOUR, RC, WIDTH, look, new_figure, styled
+from cnc_shape.report.style import PATH_COLOUR, WIDTH, look, new_figure, styled
 from cnc_shape.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -21,21 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-Format = Literal["svg", "png", "pdf"]
 PANELS = 3  # paths side by side at most
 DRAWN = 1_000  # buckets of a line over time; the worst and the best of each is drawn
 DRAWN_PATH = 20_000  # points of a path that are drawn
 MAGNIFIED_SHARE = 0.1  # of the part's size: how large the largest contour error is drawn
-
-
-def render(figure: Figure, kind: Format) -> bytes:
-    """Draw a figure to bytes that depend on nothing but its content."""
-    import matplotlib as mpl
-
-    content = io.BytesIO()
-    with mpl.rc_context(RC):
-        figure.savefig(content, format=kind, metadata=METADATA[kind], dpi=160)
-    return content.getvalue()
 
 
 def worst_rows(values: FloatArray, buckets: int = DRAWN) -> IntArray:

@@ -23,6 +23,7 @@ from cnc_shape.recording import Samples, Signals, require_finite
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
 from cnc_shape.report.shaper_figure import shaper_figure
+from cnc_shape.report.style import Format, render
 from cnc_shape.report.table import summary_json, tables_csv
 from cnc_shape.shapers import Shaper
 from cnc_shape.units import DEGREE
@@ -44,7 +45,7 @@ class Context:
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper])
     modes: Mapping[str, Sequence[Mode]] = field(default_factory=dict[str, Sequence[Mode]])
     warnings: Sequence[str] = ()
-    figure_format: figures.Format = "svg"
+    figure_format: Format = "svg"
     program: Path | None = None  # where the program's text lies, to show its worst lines
 
 
@@ -92,7 +93,7 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
     for signals in run.signals:
         _require_finite(signals)
     drawn = draw(run, context)
-    svg = {name: figures.render(figure, "svg") for name, figure in drawn.items()}
+    svg = {name: render(figure, "svg") for name, figure in drawn.items()}
     page = Page(svg, context.shapers, context.modes, context.warnings, context.program, context.machine)
     kind = context.figure_format
     content = {
@@ -103,7 +104,7 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
         MARKER: _run_json(context),
     }
     for name, figure in drawn.items():
-        content[f"figures/{name}.{kind}"] = svg[name] if kind == "svg" else figures.render(figure, kind)
+        content[f"figures/{name}.{kind}"] = svg[name] if kind == "svg" else render(figure, kind)
 
     def build(target: Path) -> None:
         (target / "figures").mkdir()

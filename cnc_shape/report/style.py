@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import io
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec
 
 from numpy.typing import NDArray
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 P = ParamSpec("P")
+Format = Literal["svg", "png", "pdf"]
 WIDTH = 7.2  # inch, two columns of a journal
 
 # Okabe and Ito's palette, ordered so that the first cases contrast most
@@ -91,3 +93,13 @@ def new_figure(
     FigureCanvasAgg(figure)
     grid: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return figure, list(grid.ravel())
+
+
+def render(figure: Figure, kind: Format) -> bytes:
+    """Draw a figure to bytes that depend on nothing but its content."""
+    import matplotlib as mpl
+
+    content = io.BytesIO()
+    with mpl.rc_context(RC):
+        figure.savefig(content, format=kind, metadata=METADATA[kind], dpi=160)
+    return content.getvalue()
