@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,16 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 
 CLUSTER_RADIUS = 0.25  # -, of |s - s_0| in units of the search: closer modes share a cluster
 SERIES_TERMS = 26  # of e^{(s - c) t}: rounding at |s - c| t = 2
+LONGEST_TIME = 8.0  # in units of the search: up to it the series is good
+ROUNDING = 1e-18  # -, of a term of the series
+RIDGE = 1e-6  # -, keeps the first amplitudes tame where times coincide
 ITERATIONS = 40  # of Levenberg-Marquardt
 LARGEST_STEP = 0.2  # -, of a time in one iteration, in units of the search
 STEEPEST_DAMPING = 1e8  # -, a start that needs more has failed
 FLAT_DIRECTION = 1e-13  # -, damping of an unknown that changes nothing: the time of an impulse of 0
 CONVERGED = 1e-20  # -, |F|^2
+SMALLEST_SCALE = 1e-12  # -, of a column of the Jacobian
+RANK_TOLERANCE = 1e-13  # -, of the scaled Jacobian
 POLISHING_STEPS = 12  # of Newton; quadratic, three or four do
 
 
@@ -89,7 +94,8 @@ def conditions(poles: Sequence[complex], orders: Sequence[int]) -> Conditions:
         differences = _divided_differences(nodes)
         centres += [centre] * len(nodes)
         rows += list(differences)
-    width = max(int(np.flatnonzero(row)[-1]) + 1 for row in rows)
+    weight = LONGEST_TIME ** np.arange(max(row.size for row in rows))
+    width = max(int(np.flatnonzero(np.abs(row) * weight[: row.size] > ROUNDING)[-1]) + 1 for row in rows)
     polynomials = np.zeros((len(rows), width), dtype=np.complex128)
     for line, row in zip(polynomials, rows, strict=True):
         line[: min(width, row.size)] = row[:width]
@@ -134,9 +140,8 @@ def least_squares_amplitudes(rows: Conditions, times: FloatArray) -> FloatArray:
     m = times.shape[1]
     _, jacobian = residual_and_jacobian(rows, times, np.zeros_like(times))
     linear = jacobian[:, :, :m]
-    normal = linear.transpose(0, 2, 1) @ linear + 1e-6 * np.eye(m)
-    amplitudes: FloatArray = np.linalg.solve(normal, linear[:, 0, :, None])[:, :, 0]
-    return amplitudes
+    normal = linear.transpose(0, 2, 1) @ linear + RIDGE * np.eye(m)
+    return np.asarray(np.linalg.solve(normal, linear[:, 0, :, None])[:, :, 0], dtype=np.float64)
 
 
 def solve_from(rows: Conditions, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -200,8 +205,8 @@ def polish(
     residual, jacobian = _at(rows, x[None], m)
     error = float(np.abs(residual).max())
     for _ in range(POLISHING_STEPS):
-        scale = np.maximum(np.linalg.norm(jacobian[0], axis=0), 1e-12)
-        step: FloatArray = np.linalg.lstsq(jacobian[0] / scale, residual[0], rcond=1e-13)[0]
+        scale = np.sqrt((jacobian[0] ** 2).sum(axis=0)).clip(min=SMALLEST_SCALE)
+        step = cast("FloatArray", np.linalg.lstsq(jacobian[0] / scale, residual[0], rcond=RANK_TOLERANCE)[0])
         tried = x - step / scale
         new_residual, new_jacobian = _at(rows, tried[None], m)
         new_error = float(np.abs(new_residual).max())

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf, isfinite, pi
+from numbers import Integral
 
 import numpy as np
 
@@ -19,7 +20,7 @@ MOST_CONDITIONS = 8  # modes and derivatives together; beyond, the search takes 
 DEFAULT_MAX_AMPLITUDE = 2.0  # -, the shortest shaper depends on this bound
 
 BATCH = 256  # starts solved together
-PATIENCE = 8  # batches without a shorter solution, for each time searched
+PATIENCE = 6  # batches without a shorter solution, for each time searched
 MOST_BATCHES = 40  # in all, for each time searched
 EQUALLY_SPACED = 128  # starts of impulses at equal distances
 HORIZONS = (1.05, 2.1, 4.2)  # of the cascade's duration: where solutions are sought, in turn
@@ -155,7 +156,7 @@ def _checked(modes: Sequence[Mode], max_amplitude: float, derivatives: Sequence[
             argument="derivatives",
         )
     for order in orders:
-        if isinstance(order, bool) or order != int(order) or order < 0:
+        if isinstance(order, bool) or not isinstance(order, Integral) or order < 0:
             raise OptionError(
                 f"derivatives must be whole numbers from 0 on, not {order}",
                 hint="1 makes the shaper robust to an error of that mode's frequency, 0 does not",
