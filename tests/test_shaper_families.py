@@ -32,8 +32,9 @@ from cnc_shape.shapers import (
     zvdd,
     zvddd,
 )
-from cnc_shape.shapers.analysis import insensitivity, residual_vibration, vibration
+from cnc_shape.shapers.analysis import residual_vibration, vibration
 from cnc_shape.shapers.extra_insensitive import extra_insensitive
+from cnc_shape.shapers.insensitivity import insensitivity
 
 EXACT = ["zv", "zvd", "zvdd", "zvddd", "umzv", "mzv"]  # nothing is left at the mode
 EXTRA = {"ei": 0.05, "2hump_ei": 0.0, "3hump_ei": 0.05}  # what is left at the mode, at 5 %

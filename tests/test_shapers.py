@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 from cnc_shape.errors import OptionError
 from cnc_shape.modes import Mode
 from cnc_shape.shapers import cascade, make_shaper, zv, zvd
-from cnc_shape.shapers.analysis import contour_factor, insensitivity, phasor, residual_vibration
+from cnc_shape.shapers.analysis import contour_factor, phasor, residual_vibration
+from cnc_shape.shapers.insensitivity import insensitivity
 from cnc_shape.shapers.shaper import convolve
 
 modes = st.builds(Mode, st.floats(0.5, 200.0), st.floats(0.0, 0.3))

@@ -17,8 +17,8 @@ from cnc_shape.modes import Mode
 from cnc_shape.report.shaper_sheet import Corner, design_json, design_text, title
 from cnc_shape.report.style import Format
 from cnc_shape.shapers import SINGLE_MODE
-from cnc_shape.shapers.analysis import DEFAULT_VIBRATION_TOLERANCE
 from cnc_shape.shapers.comparison import Comparison, Design, compare
+from cnc_shape.shapers.insensitivity import DEFAULT_VIBRATION_TOLERANCE
 from cnc_shape.shapers.measures import assess
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ import numpy as np
 from cnc_shape.modes import Mode
 from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, look, new_figure, styled
 from cnc_shape.shapers import Shaper
-from cnc_shape.shapers.analysis import Insensitivity, insensitivity, residual_vibration
+from cnc_shape.shapers.analysis import residual_vibration
+from cnc_shape.shapers.insensitivity import Insensitivity, insensitivity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

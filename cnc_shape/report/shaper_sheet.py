@@ -113,7 +113,7 @@ def design_text(design: Design, options: Mapping[str, object], corner: Corner) -
             f"  duration {1e3 * shaper.duration:.3f} ms, delay {1e3 * shaper.delay:.3f} ms",
             f"  vibration left at the design point {100.0 * max(found.residual_vibration):.2g} %",
             *(_error_text(error, design, k) for k, error in enumerate(found.model_error)),
-            f"  at most {100.0 * band.tolerance:.3g} % for {band.low:.4f} to {high} of the modelled frequency",
+            f"  at most {100.0 * band.tolerance:.3g} % for {band.low:.4f} to {high} of the frequency",
             f"  a step asks up to {shaper.max_running_sum:.4f} times, "
             f"any other motion up to {shaper.sum_abs_amplitude:.4f} times the unshaped command",
             f"  a corner at {corner.speed:g} mm/s is cut by {cut:.3g} µm; "

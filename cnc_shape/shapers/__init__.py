@@ -18,7 +18,9 @@ from cnc_shape.shapers.firmware import (
     klipper_ei,
 )
 from cnc_shape.shapers.modified_zero_vibration import mzv
+from cnc_shape.shapers.multi_mode import multi_mode
 from cnc_shape.shapers.shaper import NONE, Shaper, make_shaper
+from cnc_shape.shapers.specified_duration import Robustness, sd
 from cnc_shape.shapers.unity_magnitude import umzv
 from cnc_shape.shapers.virtual_mode import virtual_mode
 from cnc_shape.shapers.zero_vibration import zv, zvd, zvdd, zvddd
@@ -41,8 +43,8 @@ PLAIN: Mapping[str, Callable[[Mode], Shaper]] = {
     "duet_ei2": duet_ei2,
     "duet_ei3": duet_ei3,
 }
-SINGLE_MODE: Mapping[str, Callable[..., Shaper]] = {**PLAIN, "virtual_mode": virtual_mode}
-MULTI_MODE: Mapping[str, Callable[..., Shaper]] = {"cascade": cascade}
+SINGLE_MODE: Mapping[str, Callable[..., Shaper]] = {**PLAIN, "virtual_mode": virtual_mode, "sd": sd}
+MULTI_MODE: Mapping[str, Callable[..., Shaper]] = {"cascade": cascade, "multi_mode": multi_mode}
 SHAPERS: Mapping[str, Callable[..., Shaper]] = {**SINGLE_MODE, **MULTI_MODE, "impulses": make_shaper}
 
 __all__ = [
@@ -51,6 +53,7 @@ __all__ = [
     "PLAIN",
     "SHAPERS",
     "SINGLE_MODE",
+    "Robustness",
     "Shaper",
     "cascade",
     "duet_ei2",
@@ -61,7 +64,9 @@ __all__ = [
     "klipper_3hump_ei",
     "klipper_ei",
     "make_shaper",
+    "multi_mode",
     "mzv",
+    "sd",
     "three_hump_ei",
     "two_hump_ei",
     "umzv",

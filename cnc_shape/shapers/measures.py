@@ -9,7 +9,8 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.modes import Mode
-from cnc_shape.shapers.analysis import Insensitivity, contour_factor, insensitivity, vibration
+from cnc_shape.shapers.analysis import contour_factor, vibration
+from cnc_shape.shapers.insensitivity import Insensitivity, insensitivity
 from cnc_shape.shapers.shaper import Shaper
 
 ASSUMED_FREQUENCY_ERROR = 0.1  # -, relative, of a mode that does not say how uncertain it is
