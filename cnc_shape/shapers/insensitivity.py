@@ -149,7 +149,7 @@ class _Curve:
         first[outside.any(axis=1)] = outside.argmax(axis=1)[outside.any(axis=1)]
         beyond = np.where(first < points, ratio[0][np.minimum(first, points - 1)], inf)
         before = ratio[0][np.maximum(first - 1, 0)]
-        earlier: BoolArray = np.less(np.arange(1, points - 1), first[:, None])
+        earlier: BoolArray = np.arange(1, points - 1, dtype=np.int64) < first[:, None]
         humps: BoolArray = (value[:, 1:-1] >= value[:, :-2]) & (value[:, 1:-1] >= value[:, 2:])
         humps = humps & (value[:, 1:-1] > -CLOSE) & earlier
         at, where = np.nonzero(humps)
