@@ -65,9 +65,7 @@ class ShaperOption:
         """Default as a file would give it; Ellipsis where there is none."""
         if self.default is inspect.Parameter.empty:
             return ...
-        if isinstance(self.default, Enum):
-            return self.default.value
-        return next((name for name, function in PLAIN.items() if function is self.default), self.default)
+        return _in_file(self.default)
 
     def value(self, given: object) -> object:
         """What the function takes for the value `given` in a file."""
@@ -98,13 +96,15 @@ def key_of(argument: str | None) -> str | None:
 
 def as_given(name: str, values: Mapping[str, object]) -> dict[str, object]:
     """Return arguments of the shaper's function as the options that a file would give: key: value."""
-    names = {function: word for word, function in PLAIN.items()}
     options = {option.parameter: key for key, option in options_of(name).items()}
-    return {
-        options[parameter]: value.value if isinstance(value, Enum) else names.get(value, value)  # pyright: ignore[reportArgumentType, reportCallIssue]
-        for parameter, value in values.items()
-        if value is not None
-    }
+    return {options[parameter]: _in_file(value) for parameter, value in values.items() if value is not None}
+
+
+def _in_file(value: object) -> object:
+    """The word for a value that a file names by one, or the value itself."""
+    if isinstance(value, Enum):
+        return value.value
+    return next((name for name, function in PLAIN.items() if function is value), value)
 
 
 def options_model(name: str) -> type[ShaperModel]:

@@ -12,6 +12,8 @@ from cnc_shape.modes import Mode
 from cnc_shape.shapers import (
     PLAIN,
     cascade,
+    multi_mode,
+    sd,
     virtual_mode,
 )
 from cnc_shape.shapers.measures import Assessment, assess
@@ -19,8 +21,10 @@ from cnc_shape.shapers.shaper import Shaper
 
 EASY = 1.0 + 1e-9  # -, sum |A| of a shaper that never asks more of an axis than the command does
 ALIKE = 0.01  # -, margins that differ by less are the same
-SHORT, LONG = 0.35, 1.3  # damped periods, durations of SD shapers that are worth a look
-ACTUATOR = 1.0, 1.5  # -, amplitude that an SD and a virtual-mode shaper may use in a comparison
+SD_PERIODS = (0.9, 1.3, 1.8)  # durations just beyond the jumps of an SD shaper's insensitivity
+SHORT_SD = 0.35  # damped periods, with a negative impulse
+ACTUATOR = 1.0  # -, how high the impulses of that one may be
+VIRTUAL_ACTUATOR = 1.5  # -, and those of a virtual mode (paper 001)
 COMPARED = ("zv", "zvd", "zvdd", "zvddd", "umzv", "mzv", "ei", "2hump_ei", "3hump_ei")
 
 
@@ -77,14 +81,25 @@ class Comparison:
 
 def candidates(modes: Sequence[Mode]) -> list[Candidate]:
     """What is worth comparing for these modes."""
-    if len(modes) == 1:
-        (mode,) = modes
-        found = [Candidate(name, partial(PLAIN[name], mode)) for name in COMPARED]
-        if mode.damping_ratio == 0.0:
-            found.append(Candidate("virtual_mode", partial(virtual_mode, mode, max_amplitude=ACTUATOR[1])))
-        return found
+    if len(modes) > 1:
+        return _for_several(modes)
+    (mode,) = modes
+    found = [Candidate(name, partial(PLAIN[name], mode)) for name in COMPARED]
+    found.append(Candidate("sd", partial(sd, mode, duration_periods=SHORT_SD, max_amplitude=ACTUATOR)))
+    found += [Candidate("sd", partial(sd, mode, duration_periods=periods)) for periods in SD_PERIODS]
+    if mode.damping_ratio == 0.0:
+        found.append(Candidate("virtual_mode", partial(virtual_mode, mode, max_amplitude=VIRTUAL_ACTUATOR)))
+    return found
+
+
+def _for_several(modes: Sequence[Mode]) -> list[Candidate]:
     parts: list[Callable[[Mode], Shaper]] = [PLAIN["zv"], PLAIN["zvd"], PLAIN["ei"]]
-    return [Candidate("cascade", partial(cascade, modes, of=part)) for part in parts]
+    return [
+        *(Candidate("cascade", partial(cascade, modes, of=part)) for part in parts),
+        Candidate("multi_mode", partial(multi_mode, modes)),
+        Candidate("multi_mode", partial(multi_mode, modes, positive=True)),
+        Candidate("multi_mode", partial(multi_mode, modes, derivatives=[1] * len(modes))),
+    ]
 
 
 def compare(
