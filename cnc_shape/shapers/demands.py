@@ -20,6 +20,7 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 SAMPLES_PER_LOBE = 16  # of V over frequency, whose lobes are as wide as one over the duration
 DAMPING_SAMPLES = 5
 LEAST_BAND = 17  # samples, however narrow a band is
+LARGEST_EXPONENT = 50.0  # of times that an iteration tries in the wrong order
 SUMMIT_STEPS = 3  # parabolas from a sample to its summit
 SUMMIT_SHARE = 0.8  # -, of what a summit must exceed: lower samples cannot belong to it
 END_AMPLITUDE = 1e-4  # -, least of a last impulse: the decay in V counts from there
@@ -87,9 +88,8 @@ def pole(omega: FloatArray | float, zeta: FloatArray | float) -> ComplexArray:
 
 def waves(poles: ComplexArray, times: FloatArray) -> ComplexArray:
     """``e^{s t - Re(s) t_N}``, shape of `poles` + (n,): decayed from the last time, so it cannot overflow."""
-    return np.exp(
-        np.multiply.outer(poles.real, times - times[-1]) + 1j * np.multiply.outer(poles.imag, times)
-    )
+    decay = np.minimum(np.multiply.outer(poles.real, times - times[-1]), LARGEST_EXPONENT)
+    return np.exp(decay + 1j * np.multiply.outer(poles.imag, times))
 
 
 def zero_rows(zeros: Sequence[Zero], times: FloatArray) -> ComplexArray:
@@ -124,15 +124,16 @@ def peaks(
             if step == 0.0:
                 continue
             here, (low, high) = (omega, band.omega) if axis == 0 else (zeta, band.zeta)
-            stencil = np.clip(here[:, None] + step * np.array([-1.0, 0.0, 1.0]), low, high)
+            middle = np.clip(here, low + step, high - step)  # at an edge the summit may lie inside
+            stencil = np.clip(middle[:, None] + step * np.array([-1.0, 0.0, 1.0]), low, high)
             poles = pole(stencil, zeta[:, None]) if axis == 0 else pole(omega[:, None], stencil)
             v = np.abs(waves(poles, times) @ amplitudes)
             there = _summit(stencil, v)
             tried = np.abs(waves(pole(there, zeta) if axis == 0 else pole(omega, there), times) @ amplitudes)
-            options = np.column_stack([v, tried])
+            options = np.column_stack([v, tried, value])
             which = options.argmax(axis=1)[:, None]
             value = np.take_along_axis(options, which, axis=1)[:, 0]
-            there = np.take_along_axis(np.column_stack([stencil, there]), which, axis=1)[:, 0]
+            there = np.take_along_axis(np.column_stack([stencil, there, here]), which, axis=1)[:, 0]
             omega, zeta = (there, zeta) if axis == 0 else (omega, there)
         steps = [step / 6.0 for step in steps]
     high_enough = value > above

@@ -24,8 +24,9 @@ from cnc_shape.shapers.demands import ComplexArray, Demands, peaks, pole, waves,
 FIRST_PHASES = 6  # half planes a frequency begins with
 FIRST_FREQUENCIES = 9
 MOST_ROUNDS = 12
+KEPT = 0.8  # -, of the tolerance: how near to a half plane an answer comes that needs it
 CUT_TOLERANCE = 2e-3  # -, of the tolerance: how much of a cone the half planes may leave out
-NO_EXCESS = 1e-7
+ZERO_SHARE = 1e-3  # -, of the excess that a zero may have beside quiet bands
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,18 +58,34 @@ def first_cuts(demands: Demands) -> Cuts:
     return Cuts(np.repeat(at, FIRST_PHASES), np.tile(phases, at.size))
 
 
-def best_on_grid(demands: Demands, times: FloatArray, cuts: Cuts) -> tuple[GridAnswer, Cuts]:
-    """Minimise the excess on a grid of times; return the half planes found on the way, too."""
+def best_on_grid(
+    demands: Demands, times: FloatArray, cuts: Cuts, enough: float | None = None
+) -> tuple[GridAnswer, Cuts]:
+    """Minimise the excess on a grid of times; return the half planes that matter, too.
+
+    With `enough` the answer may stop as soon as it is clear whether the excess is larger than that: half
+    planes allow more than the cones, so an excess of theirs is one of the cones'.
+    """
     answer = _solve(demands, times, cuts)
     for _ in range(MOST_ROUNDS if demands.bands else 0):
-        level = demands.tolerance + max(answer.excess, 0.0) + CUT_TOLERANCE * demands.tolerance
+        if answer.excess == inf or (enough is not None and answer.excess > enough):
+            break
+        level = demands.tolerance + max(answer.excess, enough or 0.0, 0.0) + CUT_TOLERANCE * demands.tolerance
         at = np.concatenate([peaks(band, times, answer.amplitudes, level)[0] for band in demands.bands])
-        if at.size == 0 or answer.excess == inf:
+        if at.size == 0:
             break
         phases = np.angle(waves(at, times) @ answer.amplitudes)
         cuts = Cuts(np.concatenate([cuts.poles, at]), np.concatenate([cuts.phases, phases]))
         answer = _solve(demands, times, cuts)
-    return answer, cuts
+    return answer, _that_matter(demands, answer, cuts)
+
+
+def _that_matter(demands: Demands, answer: GridAnswer, cuts: Cuts) -> Cuts:
+    """The first half planes, and of the others those that the answer comes near to."""
+    height = (waves(cuts.poles, answer.times) @ answer.amplitudes * np.exp(-1j * cuts.phases)).real
+    kept = height > KEPT * demands.tolerance
+    kept[: first_cuts(demands).poles.size] = True
+    return Cuts(cuts.poles[kept], cuts.phases[kept])
 
 
 def _solve(demands: Demands, times: FloatArray, cuts: Cuts) -> GridAnswer:
@@ -89,7 +106,9 @@ def _solve(demands: Demands, times: FloatArray, cuts: Cuts) -> GridAnswer:
         rows = rows[:, :-1] - rows[:, 1:]
         box = [(bounds.min_running_sum, bounds.max_running_sum)] * (n - 1)
         total = one = None
-    rows = np.column_stack([rows, np.full(len(rows), -1.0)])
+    share = np.full(len(rows), -1.0)
+    share[: 4 * len(exact)] = -ZERO_SHARE if demands.bands else -1.0
+    rows = np.column_stack([rows, share])
     matrix: Any = rows
     extra = 0
     if not bounds.positive and (bounds.limits_size or bounds.max_sum_abs_amplitude < inf):

@@ -19,7 +19,7 @@ from cnc_shape.errors import InfeasibleError, OptionError
 from cnc_shape.modes import Mode
 from cnc_shape.shapers.demands import END_AMPLITUDE, Band, Bounds, Demands, Zero, pole_of
 from cnc_shape.shapers.linear_program import Cuts, GridAnswer, best_on_grid, first_cuts
-from cnc_shape.shapers.polish import DROPPED, Impulses, polish
+from cnc_shape.shapers.polish import DROPPED, Impulses, polish, repair
 from cnc_shape.shapers.shaper import Shaper
 
 MOST_MODES = 6
@@ -34,6 +34,9 @@ SAME_MODE = 1e-6  # -, relative distance of frequencies that are one
 COARSE, FINE = (36.0, 9.0), (100.0, 16.0)  # grid points a slowest and a fastest period
 MOST_POINTS = 900
 LEAST_POINTS = 48
+NEIGHBOURS = 2  # points of the grid: impulses this close are one that lies between
+SMALL = 1e-6  # -, amplitude of an impulse that is none
+STRETCHES = 1.0, 1.01, 1.03, 1.1
 BRACKET, END = 0.03, 0.002  # -, relative width at which the coarse and the fine bisection stop
 
 
@@ -238,7 +241,7 @@ def _bracket(
     above: GridAnswer | None = None
     duration, enough = guess, 2.0 * demands.tolerance * 1e-3 if demands.bands else 1e-7
     while True:
-        answer, cuts = best_on_grid(demands, _grid(demands, duration, density), cuts)
+        answer, cuts = best_on_grid(demands, _grid(demands, duration, density), cuts, enough)
         if answer.excess <= enough:
             above = answer
         else:
@@ -270,6 +273,8 @@ def _shortest(demands: Demands) -> Impulses | None:
         return None
     near = float(above.times[-1]) * (1.0 - BRACKET / 2)
     below, fine, cuts = _bracket(demands, cuts, near, FINE, END, 1.0 + BRACKET)
+    if demands.bands and below is not None:
+        below, cuts = best_on_grid(demands, below.times, cuts)
     best: Impulses | None = None
     for start in _starts(demands, [below, fine, above]):
         found = polish(demands, start)
@@ -277,20 +282,29 @@ def _shortest(demands: Demands) -> Impulses | None:
             best = found
         if best is not None and fine is not None and best.times[-1] <= fine.times[-1] * (1.0 + END):
             break
-    return best
+    return best or _on_grid(demands, float((fine or above).times[-1]), cuts)
 
 
 def _starts(demands: Demands, answers: Sequence[GridAnswer | None]) -> Iterator[Impulses]:
-    for answer in answers:
-        if answer is not None and answer.excess < inf:
-            yield _merged(demands, answer)
+    known = [answer for answer in answers if answer is not None and answer.excess < inf]
+    yield from (_merged(demands, answer, NEIGHBOURS) for answer in known)
+    yield from (_merged(demands, answer, 0) for answer in known[:2])
 
 
-def _merged(demands: Demands, answer: GridAnswer) -> Impulses:
-    """Neighbouring impulses of one sign as one, at their centroid; the last stays the last."""
+def _on_grid(demands: Demands, duration: float, cuts: Cuts) -> Impulses | None:
+    """Impulses that stay on the grid, on durations that leave room for their rounding."""
+    for stretch in STRETCHES:
+        answer, cuts = best_on_grid(demands, _grid(demands, duration * stretch, FINE), cuts)
+        if answer.excess < inf and (found := repair(demands, _merged(demands, answer, 0))) is not None:
+            return found
+    return None
+
+
+def _merged(demands: Demands, answer: GridAnswer, neighbours: int) -> Impulses:
+    """Impulses on the grid; those of one sign that are `neighbours` points apart at most as one."""
     a = answer.amplitudes.copy()
     a[-1] = a[-1] if abs(a[-1]) > END_AMPLITUDE else END_AMPLITUDE
-    kept = np.flatnonzero(np.abs(a) > 1e-6)
+    kept = np.flatnonzero(np.abs(a) > SMALL)
     times: list[float] = []
     amplitudes: list[float] = []
     previous = -9

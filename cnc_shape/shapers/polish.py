@@ -7,9 +7,10 @@ active constraints takes the rest of the error away.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from cnc_shape.shapers.demands import (
 
 MOST_STEPS = 40
 MOST_EXCHANGES, MOST_QUADRATIC_STEPS = 4, 60
+MOST_UNKNOWNS = 18  # for quadratic programming, whose time grows with their cube
+MOST_REPAIRS = 4
 ENOUGH = 1e-8  # -, of the duration: a gain that is not worth another exchange
 SNAP = 0.1  # -, how near its bound a running sum is put there
 PENALTY = 20.0  # periods a unit of violation
@@ -128,47 +131,66 @@ def _linear(demands: Demands, signs: FloatArray) -> tuple[FloatArray, FloatArray
 def polish(demands: Demands, start: Impulses) -> Impulses | None:
     """Shortest impulses near `start`, verified; None where the iteration ends at none.
 
-    Running sums that lie near their bounds are put there first, and only the others and the times moved:
-    without bounds on single amplitudes the shortest impulses switch from bound to bound.
+    Where all running sums lie near their bounds they are put there first, and only the times moved: without
+    bounds on single amplitudes the shortest impulses switch from bound to bound.
     """
-    found = [_polish(demands, x, free) for x, free in _variants(demands, start)]
-    return min((one for one in found if one is not None), key=lambda one: one.times[-1], default=None)
-
-
-def _variants(demands: Demands, start: Impulses) -> list[tuple[FloatArray, BoolArray]]:
-    """Return where to begin, and which unknowns may move."""
-    bounds, n = demands.bounds, start.times.size
+    n = start.times.size
     x = np.concatenate([start.times[1:], start.amplitudes])
-    everything = np.ones(x.size, dtype=np.bool_)
+    switching = _switching(demands, start)
+    if switching is not None:
+        only_times = np.arange(x.size) < n - 1
+        found = _polish(demands, np.concatenate([x[: n - 1], switching]), only_times)
+        if found is not None:
+            return found
+    return _polish(demands, x, np.ones(x.size, dtype=np.bool_))
+
+
+def repair(demands: Demands, start: Impulses) -> Impulses | None:
+    """Impulses next to `start` that meet every demand, no matter how long they take."""
+    x = np.concatenate([start.times[1:], start.amplitudes])
+    linear = _linear(demands, np.where(start.amplitudes < 0.0, -1.0, 1.0))
+    return _verified(demands, x, np.ones(x.size, dtype=np.bool_), linear)
+
+
+def _switching(demands: Demands, start: Impulses) -> FloatArray | None:
+    """Amplitudes with every running sum at a bound, if `start` is near such; None else."""
+    bounds = demands.bounds
     if bounds.positive or bounds.limits_size or bounds.max_sum_abs_amplitude < inf:
-        return [(x, everything)]
+        return None
     sums = np.cumsum(start.amplitudes)[:-1]
     low, high = sums - bounds.min_running_sum < SNAP, bounds.max_running_sum - sums < SNAP
-    sums = np.where(low, bounds.min_running_sum, np.where(high, bounds.max_running_sum, sums))
-    snapped = np.diff(np.concatenate([[0.0], sums, [1.0]]))
-    if not (low | high).all() or (snapped == 0.0).any():
-        return [(x, everything)]
-    only_times = np.arange(x.size) < n - 1
-    return [(np.concatenate([x[: n - 1], snapped]), only_times)]
+    sums = np.where(low, bounds.min_running_sum, bounds.max_running_sum)
+    amplitudes = np.diff(np.concatenate([[0.0], sums, [1.0]]))
+    return amplitudes if (low | high).all() and (amplitudes != 0.0).all() else None
 
 
-def _polish(demands: Demands, x: FloatArray | None, free: BoolArray) -> Impulses | None:
-    if x is None:
-        return None
+def _polish(demands: Demands, x: FloatArray, free: BoolArray) -> Impulses | None:
     linear = _linear(demands, np.where(_split(x)[1] < 0.0, -1.0, 1.0))
-    x = _descend(demands, x, free, linear)
-    best: Impulses | None = None
-    for exchange in range(MOST_EXCHANGES + 1):
-        if x is None:
+    end = _descend(demands, x, free, linear)
+    if end is None:
+        return None
+    best = _verified(demands, end, free, linear)
+    for _ in range(MOST_EXCHANGES if int(free.sum()) <= MOST_UNKNOWNS else 0):
+        end = _settle(_constraints(demands, end, linear), end, free)
+        found = None if end is None else _verified(demands, end, free, linear)
+        if found is not None and best is not None and found.times[-1] >= best.times[-1] * (1.0 - ENOUGH):
             break
-        constraints = _constraints(demands, x, linear)
-        t, a = _split(_newton(constraints, x, free))
-        if is_solution(demands, t, a):
-            if best is not None and t[-1] >= best.times[-1] * (1.0 - ENOUGH):
-                break
-            best = Impulses(t, a)
-        x = _settle(constraints, x, free) if exchange < MOST_EXCHANGES else None
+        best = found or best
+        if end is None:
+            break
     return best
+
+
+def _verified(
+    demands: Demands, x: FloatArray, free: BoolArray, linear: tuple[FloatArray, FloatArray]
+) -> Impulses | None:
+    """Meet what is missed by little, with the maxima of V where they come to lie; None if that fails."""
+    for _ in range(MOST_REPAIRS):
+        x = _newton(_constraints(demands, x, linear), x, free)
+        t, a = _split(x)
+        if is_solution(demands, t, a):
+            return Impulses(t, a)
+    return None
 
 
 def _settle(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatArray | None:
@@ -203,8 +225,8 @@ def _settle(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatA
         return constraints.inequalities(whole(z))[1][:, free]
 
     has_equations = bool(free.all()) or constraints.zeros.size > 0
-    find: Any = minimize
-    result: Any = find(
+    find = cast("Callable[..., Any]", minimize)
+    result = find(
         duration, x[free], jac=slope, method="SLSQP",
         constraints=[
             *([{"type": "eq", "fun": zero, "jac": zero_slope}] if has_equations else []),
