@@ -287,8 +287,10 @@ def _shortest(demands: Demands) -> Impulses | None:
 
 def _starts(demands: Demands, answers: Sequence[GridAnswer | None]) -> Iterator[Impulses]:
     known = [answer for answer in answers if answer is not None and answer.excess < inf]
-    yield from (_merged(demands, answer, NEIGHBOURS) for answer in known)
-    yield from (_merged(demands, answer, 0) for answer in known[:2])
+    merged = [_merged(demands, answer, NEIGHBOURS) for answer in known]
+    yield from merged
+    single = [_merged(demands, answer, 0) for answer in known[:2]]
+    yield from (some for some, few in zip(single, merged, strict=False) if some.times.size > few.times.size)
 
 
 def _on_grid(demands: Demands, duration: float, cuts: Cuts) -> Impulses | None:

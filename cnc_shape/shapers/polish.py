@@ -26,19 +26,21 @@ from cnc_shape.shapers.demands import (
     zero_rows,
 )
 
-MOST_STEPS = 40
+MOST_STEPS = 60
 MOST_EXCHANGES, MOST_QUADRATIC_STEPS = 4, 60
 MOST_UNKNOWNS = 18  # for quadratic programming, whose time grows with their cube
-MOST_REPAIRS = 4
+MOST_REPAIRS = 8
 ENOUGH = 1e-8  # -, of the duration: a gain that is not worth another exchange
 SNAP = 0.1  # -, how near its bound a running sum is put there
-PENALTY = 20.0  # periods a unit of violation
+PENALTIES = 100.0, 1e5  # periods a unit of violation: at first, and the highest
+NO_VIOLATION = 1e-9
 FIRST_RADIUS, LEAST_RADIUS = 0.01, 1e-11
 LEAST_GAIN = 1e-11  # periods
 MOST_NEWTON_STEPS = 8
 NEAR = 0.7  # of the tolerance: a maximum of V that is watched
 ACTIVE = 1e-7
-LARGEST_STEP = 1e-2  # of Newton's method
+LARGEST_STEP = 1e-5  # of Newton's method
+NEARLY_ACTIVE = 0.02
 ZERO_TOLERANCE = 2e-13  # -, of sum A t^k e^{s t}, t in periods
 ALLOWED_EXCESS = 5e-7  # -, of the tolerance
 DROPPED = 1e-9  # -, amplitude
@@ -186,7 +188,11 @@ def _verified(
 ) -> Impulses | None:
     """Meet what is missed by little, with the maxima of V where they come to lie; None if that fails."""
     for _ in range(MOST_REPAIRS):
-        x = _newton(_constraints(demands, x, linear), x, free)
+        constraints = _constraints(demands, x, linear)
+        nearest = _nearest(constraints, x, free)
+        if nearest is None:
+            return None
+        x = _newton(constraints, nearest, free)
         t, a = _split(x)
         if is_solution(demands, t, a):
             return Impulses(t, a)
@@ -200,6 +206,8 @@ def _settle(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatA
     last = (x.size + 1) // 2 - 2
     gradient = np.zeros(int(free.sum()))
     gradient[last] = 1.0
+    some = constraints.equations(x)[1][:, free].any(axis=1)
+    moves = constraints.inequalities(x)[1][:, free].any(axis=1)
 
     def whole(z: FloatArray) -> FloatArray:
         y = x.copy()
@@ -213,23 +221,22 @@ def _settle(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatA
         return gradient
 
     def zero(z: FloatArray) -> FloatArray:
-        return constraints.equations(whole(z))[0]
+        return constraints.equations(whole(z))[0][some]
 
     def zero_slope(z: FloatArray) -> FloatArray:
-        return constraints.equations(whole(z))[1][:, free]
+        return constraints.equations(whole(z))[1][some][:, free]
 
     def room(z: FloatArray) -> FloatArray:
-        return constraints.inequalities(whole(z))[0]
+        return constraints.inequalities(whole(z))[0][moves]
 
     def room_slope(z: FloatArray) -> FloatArray:
-        return constraints.inequalities(whole(z))[1][:, free]
+        return constraints.inequalities(whole(z))[1][moves][:, free]
 
-    has_equations = bool(free.all()) or constraints.zeros.size > 0
     find = cast("Callable[..., Any]", minimize)
     result = find(
         duration, x[free], jac=slope, method="SLSQP",
         constraints=[
-            *([{"type": "eq", "fun": zero, "jac": zero_slope}] if has_equations else []),
+            *([{"type": "eq", "fun": zero, "jac": zero_slope}] if some.any() else []),
             {"type": "ineq", "fun": room, "jac": room_slope},
         ],
         options={"maxiter": MOST_QUADRATIC_STEPS, "ftol": 1e-12},
@@ -255,7 +262,7 @@ def _constraints(demands: Demands, x: FloatArray, linear: tuple[FloatArray, Floa
 def _descend(
     demands: Demands, x: FloatArray, free: BoolArray, linear: tuple[FloatArray, FloatArray]
 ) -> FloatArray | None:
-    """Sequential linear programming in a trust region on ``t_N + PENALTY * (largest violation)``.
+    """Sequential linear programming in a trust region on ``t_N + penalty * (largest violation)``.
 
     The shortest impulses meet as many constraints as they have unknowns, as a rule: a corner, which linear
     programs find as fast as Newton's method would if it knew which constraints are active.
@@ -265,11 +272,13 @@ def _descend(
     n = (x.size + 1) // 2
     matrix, limit = linear
     cost = np.zeros(x.size + 1)
-    cost[n - 2], cost[-1] = 1.0, PENALTY
+    penalty = PENALTIES[0]
+    cost[n - 2] = 1.0
     constraints = _constraints(demands, x, linear)
     (e, by_e), (g, by_g) = constraints.equations(x), constraints.inequalities(x)
     violation, radius = _violation(e, g, len(limit)), FIRST_RADIUS
     for _ in range(MOST_STEPS):
+        cost[-1] = penalty
         curved = len(g) - len(limit)
         rows = np.concatenate([by_e[1:], -by_e[1:], -by_g[:curved]])
         rows = np.column_stack([rows, np.full(len(rows), -1.0)])
@@ -277,31 +286,63 @@ def _descend(
         sides = np.concatenate([-e[1:], e[1:], g])
         result: Any = linprog(
             cost, A_ub=rows, b_ub=sides, A_eq=np.append(by_e[0], 0.0)[None, :], b_eq=-e[:1], method="highs",
+            options={"primal_feasibility_tolerance": 1e-10},
             bounds=[*[(-radius, radius) if moves else (0.0, 0.0) for moves in free.tolist()], (0.0, None)],
         )  # fmt: skip
         if result.x is None:
             return None
         step = np.asarray(result.x[:-1], dtype=np.float64)
-        promised = PENALTY * (violation - float(result.x[-1])) - step[n - 2]
-        if promised <= LEAST_GAIN:
-            break
+        promised = penalty * (violation - float(result.x[-1])) - step[n - 2]
+        if promised <= LEAST_GAIN or radius < LEAST_RADIUS:
+            if violation < NO_VIOLATION or penalty >= PENALTIES[1]:
+                break
+            penalty, radius = 10.0 * penalty, FIRST_RADIUS / 10.0
+            continue
         tried = x + step
         constraints = _constraints(demands, tried, linear)
         there, those = constraints.equations(tried), constraints.inequalities(tried)
         misses = _violation(there[0], those[0], len(limit))
-        gained = PENALTY * (violation - misses) - step[n - 2]
+        gained = penalty * (violation - misses) - step[n - 2]
         if gained > 0.1 * promised:
             x, violation = tried, misses
             (e, by_e), (g, by_g) = there, those
         radius *= 2.0 if gained > 0.7 * promised else 0.3 if gained < 0.3 * promised else 1.0
-        if radius < LEAST_RADIUS:
-            break
     return x
 
 
 def _violation(e: FloatArray, g: FloatArray, linear: int) -> float:
     curved = g[: g.size - linear]
     return max(0.0, float(np.abs(e).max()), -float(curved.min()) if curved.size else 0.0)
+
+
+def _nearest(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatArray | None:
+    """Point next to `x` that meets the linearised constraints: least largest step, by a linear program."""
+    from scipy.optimize import linprog  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
+
+    (e, by_e), (g, by_g) = constraints.equations(x), constraints.inequalities(x)
+    scale = max(float(np.abs(e).max()), -float(g.min()))
+    if scale < 1e-13:
+        return x
+    by_e, by_g, one = by_e[:, free], by_g[:, free], np.eye(int(free.sum()))
+    moves = by_g.any(axis=1)
+    active = g[moves] < NEARLY_ACTIVE
+    rows = np.concatenate([-by_g[moves][active], one, -one])
+    reach = np.concatenate([np.zeros(int(active.sum())), np.ones(2 * len(one))])
+    some = by_e.any(axis=1)
+    result: Any = linprog(
+        np.append(np.zeros(len(one)), 1.0),
+        A_ub=np.column_stack([rows, -reach]),
+        b_ub=np.concatenate([np.minimum(g[moves][active] / scale, 1e4), np.zeros(2 * len(one))]),
+        A_eq=np.column_stack([by_e[some], np.zeros(int(some.sum()))]) if some.any() else None,
+        b_eq=-e[some] / scale if some.any() else None,
+        bounds=[(None, None)] * len(one) + [(0.0, None)], method="highs",
+        options={"primal_feasibility_tolerance": 1e-9},
+    )  # fmt: skip
+    if result.x is None:
+        return None
+    nearest = x.copy()
+    nearest[free] += scale * np.asarray(result.x[:-1], dtype=np.float64)
+    return nearest
 
 
 def _newton(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatArray:
