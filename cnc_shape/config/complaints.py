@@ -9,14 +9,13 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from cnc_shape.config.models import DRIVES_NOT_BUILT
-from cnc_shape.config.shaper_options import NOT_BUILT
 from cnc_shape.config.strict import suggestion
 from cnc_shape.config.yaml_tree import Place, Tree, dotted
 from cnc_shape.errors import ConfigError
 
 Path = tuple[str | int, ...]
 
-_TYPES_NOT_BUILT: Final = {"drive": DRIVES_NOT_BUILT, "shaper": NOT_BUILT}
+_TYPES_NOT_BUILT: Final = {"drive": DRIVES_NOT_BUILT}
 _EXPECTED: Final = {
     "float_type": "a number",
     "int_type": "a whole number",

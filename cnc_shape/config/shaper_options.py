@@ -28,7 +28,6 @@ UNIT_NAMES: Final = {  # parameter: key with its unit
     "min_gap": "min_gap_s",
     "virtual_frequency": "virtual_frequency_hz",
 }
-NOT_BUILT: Final = frozenset({"multi_mode", "sd", "optimal"}).difference(SHAPERS)
 NONE: Final = "none"
 FUNCTIONS: Final[Mapping[str, Callable[..., Shaper]]] = {NONE: lambda: UNSHAPED, **SHAPERS}
 

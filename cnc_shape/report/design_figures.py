@@ -122,6 +122,5 @@ def _draw_pareto(axes: Axes, designs: Sequence[Design], titles: Sequence[str]) -
     axes.legend(loc="lower right")
     axes.set_xlabel("duration (ms)")
     axes.set_ylabel("frequency may be off by (%)")
-    axes.margins(x=0.12, y=0.08)
-    axes.set_ylim(bottom=0.0)
-    axes.set_xlim(left=0.0)
+    axes.set_ylim(0.0, 1.08 * max(margins))
+    axes.set_xlim(0.0, 1.25 * max(durations))  # names stand to the right of their points

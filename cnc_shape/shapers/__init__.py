@@ -19,6 +19,7 @@ from cnc_shape.shapers.firmware import (
 )
 from cnc_shape.shapers.modified_zero_vibration import mzv
 from cnc_shape.shapers.multi_mode import multi_mode
+from cnc_shape.shapers.optimal import optimal
 from cnc_shape.shapers.shaper import NONE, Shaper, make_shaper
 from cnc_shape.shapers.specified_duration import Robustness, sd
 from cnc_shape.shapers.unity_magnitude import umzv
@@ -44,7 +45,11 @@ PLAIN: Mapping[str, Callable[[Mode], Shaper]] = {
     "duet_ei3": duet_ei3,
 }
 SINGLE_MODE: Mapping[str, Callable[..., Shaper]] = {**PLAIN, "virtual_mode": virtual_mode, "sd": sd}
-MULTI_MODE: Mapping[str, Callable[..., Shaper]] = {"cascade": cascade, "multi_mode": multi_mode}
+MULTI_MODE: Mapping[str, Callable[..., Shaper]] = {
+    "cascade": cascade,
+    "multi_mode": multi_mode,
+    "optimal": optimal,
+}
 SHAPERS: Mapping[str, Callable[..., Shaper]] = {**SINGLE_MODE, **MULTI_MODE, "impulses": make_shaper}
 
 __all__ = [
@@ -66,6 +71,7 @@ __all__ = [
     "make_shaper",
     "multi_mode",
     "mzv",
+    "optimal",
     "sd",
     "three_hump_ei",
     "two_hump_ei",

@@ -13,6 +13,7 @@ from cnc_shape.shapers import (
     PLAIN,
     cascade,
     multi_mode,
+    optimal,
     sd,
     virtual_mode,
 )
@@ -89,7 +90,7 @@ def candidates(modes: Sequence[Mode]) -> list[Candidate]:
     found += [Candidate("sd", partial(sd, mode, duration_periods=periods)) for periods in SD_PERIODS]
     if mode.damping_ratio == 0.0:
         found.append(Candidate("virtual_mode", partial(virtual_mode, mode, max_amplitude=VIRTUAL_ACTUATOR)))
-    return found
+    return [*found, *_optimal(modes)]
 
 
 def _for_several(modes: Sequence[Mode]) -> list[Candidate]:
@@ -99,6 +100,14 @@ def _for_several(modes: Sequence[Mode]) -> list[Candidate]:
         Candidate("multi_mode", partial(multi_mode, modes)),
         Candidate("multi_mode", partial(multi_mode, modes, positive=True)),
         Candidate("multi_mode", partial(multi_mode, modes, derivatives=[1] * len(modes))),
+        *_optimal(modes),
+    ]
+
+
+def _optimal(modes: Sequence[Mode]) -> list[Candidate]:
+    return [
+        Candidate("optimal", partial(optimal, modes)),
+        Candidate("optimal", partial(optimal, modes, positive=True)),
     ]
 
 

@@ -30,6 +30,7 @@ MOST_STEPS = 60
 MOST_EXCHANGES, MOST_QUADRATIC_STEPS = 4, 60
 MOST_UNKNOWNS = 18  # for quadratic programming, whose time grows with their cube
 MOST_REPAIRS = 8
+MOST_GROWTH = 2.0  # -, of the duration: an iteration that goes farther has run away
 ENOUGH = 1e-8  # -, of the duration: a gain that is not worth another exchange
 SNAP = 0.1  # -, how near its bound a running sum is put there
 PENALTIES = 100.0, 1e5  # periods a unit of violation: at first, and the highest
@@ -187,6 +188,7 @@ def _verified(
     demands: Demands, x: FloatArray, free: BoolArray, linear: tuple[FloatArray, FloatArray]
 ) -> Impulses | None:
     """Meet what is missed by little, with the maxima of V where they come to lie; None if that fails."""
+    longest = MOST_GROWTH * float(_split(x)[0][-1])
     for _ in range(MOST_REPAIRS):
         constraints = _constraints(demands, x, linear)
         nearest = _nearest(constraints, x, free)
@@ -194,6 +196,8 @@ def _verified(
             return None
         x = _newton(constraints, nearest, free)
         t, a = _split(x)
+        if not _in_reach(t, longest):
+            return None
         if is_solution(demands, t, a):
             return Impulses(t, a)
     return None
@@ -242,7 +246,13 @@ def _settle(constraints: _Constraints, x: FloatArray, free: BoolArray) -> FloatA
         options={"maxiter": MOST_QUADRATIC_STEPS, "ftol": 1e-12},
     )  # fmt: skip
     end = whole(np.asarray(result.x, dtype=np.float64))
-    return end if np.isfinite(end).all() and (np.diff(_split(end)[0]) > 0.0).all() else None
+    longest = MOST_GROWTH * float(_split(x)[0][-1])
+    return end if np.isfinite(end).all() and _in_reach(_split(end)[0], longest) else None
+
+
+def _in_reach(times: FloatArray, longest: float) -> bool:
+    """Whether an iteration has not run away."""
+    return bool(np.isfinite(times).all() and (np.diff(times) > 0.0).all() and times[-1] <= longest)
 
 
 def _constraints(demands: Demands, x: FloatArray, linear: tuple[FloatArray, FloatArray]) -> _Constraints:
