@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from answers import answer, refused
 from numpy.testing import assert_allclose
 
 from cnc_shape.cli import run
@@ -27,24 +28,6 @@ def place(tmp_path, monkeypatch) -> Path:
     monkeypatch.delenv("CNC_SHAPE_MACHINE", raising=False)
     (tmp_path / "part.nc").write_text(PROGRAM)
     return tmp_path
-
-
-def answer(capfd, *words: str, code: int = 0):
-    """Run a command with --json and return its object."""
-    assert run([*words, "--json"]) == code
-    return json.loads(capfd.readouterr().out)
-
-
-def refused(capfd, *words: str) -> str:
-    """Run a command that must be refused; return what it said."""
-    assert run([*words]) == 2
-    plain = capfd.readouterr()
-    assert plain.out == ""
-    assert "Traceback" not in plain.err
-    error = answer(capfd, *words, code=2)["error"]
-    assert set(error) == {"code", "message", "file", "line", "column", "hint"}
-    assert error["message"] in plain.err
-    return plain.err
 
 
 # --- simulate -------------------------------------------------------------------------------------
@@ -144,7 +127,7 @@ def test_simulate_reads_standard_input(place):
         (["apply", "part.nc", "-o", "part.nc"], ".nc is not built yet"),
         (["apply", "part.nc", "-o", "absent/out.csv"], "the folder absent does not exist"),
         (["design", "zw", "--frequency-hz", "30"], "unknown shaper 'zw'"),
-        (["design", "zv"], "which mode?"),
+        (["design", "zv"], "zv is for one mode, not 2"),
         (["design", "zv", "--frequency-hz", "-3"], "frequency must be positive, not -3.0 Hz"),
         (["design", "zv", "--frequency-hz", "nan"], "frequency must be positive"),
         (["design", "zv", "--frequency-hz", "1e-308"], "between 0.001 and 100000 Hz"),
@@ -278,57 +261,6 @@ def test_apply_writes_to_standard_output(place, capfd):
     lines = capfd.readouterr().out.splitlines()
     assert lines[0] == "time_s,x_mm,y_mm,z_mm"
     assert len(lines) > 1000
-
-
-# --- design ---------------------------------------------------------------------------------------
-
-
-def test_design_answers_the_contract(capfd):
-    result = answer(capfd, "design", "zv", "--frequency-hz", "1", "--damping-ratio", "0.1")
-    (design,) = result["designs"]
-    assert result["schema"] == "cnc-shape/design/1"
-    assert design["axis"] is None
-    assert_allclose(design["times_s"], [0.0, 0.502518907629606], atol=1e-9)
-    assert_allclose(design["amplitudes"], [0.5782861816535916, 0.42171381834640836], atol=1e-9)
-    assert_allclose(design["insensitivity"]["width"], 0.0751, atol=5e-5)
-    assert design["residual_vibration"][0] <= 1e-12
-    assert set(design) == {
-        "axis", "shaper", "modes", "options", "times_s", "amplitudes", "duration_s", "delay_s", "residual_vibration",
-        "sum_abs_amplitude", "max_running_sum", "contour_factor", "insensitivity",
-    }  # fmt: skip
-
-
-def test_design_for_a_machine_gives_a_shaper_an_axis(capfd):
-    from cnc_shape.config.bundled import bundled
-
-    result = answer(capfd, "design", "cascade", "-m", str(bundled("xy_stage.yaml")))
-    assert [design["axis"] for design in result["designs"]] == ["x", "y"]
-    assert all(len(design["modes"]) == 2 for design in result["designs"])
-
-
-@pytest.mark.parametrize(
-    "case",
-    [
-        "paper002_eq18_ZV_1Hz_z0.1",
-        "paper002_eq19_ZVD_1Hz_z0.1",
-        "paper002_eq22_ZV_container",
-        "paper000_fig9_ZV30xZV100",
-    ],
-)
-def test_design_gives_the_reference_values(shared, capfd, case):
-    reference = json.loads((shared / "data" / "shapers.json").read_text())["cases"][case]
-    name = {"ZV": "zv", "ZVD": "zvd", "ZV*ZV": "cascade"}[reference["shaper"]]
-    words = ["design", name]
-    for mode in reference["modes"]:
-        words += [
-            "--frequency-hz",
-            repr(mode["frequency_hz"]),
-            "--damping-ratio",
-            repr(mode["damping_ratio"]),
-        ]
-    (design,) = answer(capfd, *words)["designs"]
-    assert_allclose(design["times_s"], reference["times_s"], atol=1e-9)
-    assert_allclose(design["amplitudes"], reference["amplitudes"], atol=1e-9)
 
 
 def test_gates_are_read_or_refused():

@@ -18,7 +18,6 @@ from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.contour import ContourError
 from cnc_shape.errors import InfeasibleError, OutputError
 from cnc_shape.recording import Recorder
-from cnc_shape.report import figures
 from cnc_shape.report.folder import RUNS, Context, default_folder, write_report
 from cnc_shape.report.table import summary_json
 from cnc_shape.simulation import Response
@@ -54,7 +53,7 @@ def written(tmp_path_factory) -> Path:
 @pytest.fixture
 def quick(monkeypatch) -> None:
     """Leave the drawing out, where it is not what is tested."""
-    monkeypatch.setattr(figures, "render", lambda figure, kind: b"<svg/>")
+    monkeypatch.setattr("cnc_shape.report.folder.render", lambda figure, kind: b"<svg/>")
 
 
 def test_the_folder_holds_what_it_promises(written):

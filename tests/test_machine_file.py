@@ -19,7 +19,7 @@ from cnc_shape.config.dump import to_degrees
 from cnc_shape.config.machine_file import parse_machine
 from cnc_shape.config.models import MachineModel
 from cnc_shape.config.setup import Planning, Setup, ShaperChoice, Shaping
-from cnc_shape.config.shaper_options import MODELS, NOT_BUILT
+from cnc_shape.config.shaper_options import MODELS
 from cnc_shape.config.strict import Strict
 from cnc_shape.config.template import machine_template
 from cnc_shape.controllers import Control, CrossCoupling, Feedforward
@@ -279,7 +279,6 @@ def test_an_error_prints_as_one_line_with_its_place() -> None:
         ("shaper: {type: cascade, cascade: 1}", 29, "axes.x.shaper.cascade: unknown key"),
         ("shaper: {type: cascade, of: cascade}", 33, "axes.x.shaper.of: must be"),
         ("shaper: {type: cascad}", 20, "axes.x.shaper.type: must be none or zv or zvd"),
-        ("shaper: {type: sd, duration_periods: 0.8}", 20, "axes.x.shaper.type: sd is not built yet"),
         ("shaper: {type: impulses, times_s: [0, 1]}", 13, "axes.x.shaper: amplitudes is missing"),
         ("shaper: {type: impulses, times_s: [], amplitudes: []}", 39, "needs at least 1 values, not 0"),
         ("shaper: {type: impulses, times_s: [0, 1], amplitudes: [1]}", 13, "as many times as amplitudes"),
@@ -348,11 +347,52 @@ def test_what_a_machine_cannot_be_is_refused_at_its_place(
     assert (error.line, error.column) == place
 
 
-@pytest.mark.parametrize("name", sorted(NOT_BUILT))
-def test_a_shaper_of_the_contract_is_refused_as_not_built(name: str) -> None:
-    error = refusal(with_axis(f"shaper: {{type: {name}}}"))
-    assert error.reason == f"axes.x.shaper.type: {name} is not built yet"
-    assert all(built in (error.hint or "") for built in SHAPERS)
+EVERY_SHAPER = [
+    *(f"type: {name}" for name in sorted(SHAPERS) if name not in ("sd", "virtual_mode", "impulses")),
+    "type: zv, derivatives: 4",
+    "type: mzv, impulses: 4, duration_periods: 1.0",
+    "type: ei, vibration_tolerance: 0.02",
+    "type: virtual_mode, virtual_frequency_hz: 150",
+    "type: sd, duration_periods: 1.3, metric: margin",
+    "type: sd, duration_s: 0.012, max_amplitude: 1.2, min_gap_s: 0.001",
+    "type: multi_mode, derivatives: [1], positive: true",
+    "type: optimal, min_running_sum: -1, max_running_sum: 1.0",
+    "type: cascade, of: ei",
+    "type: impulses, times_s: [0, 0.01], amplitudes: [0.5, 0.5]",
+]
+
+
+@pytest.mark.parametrize("shaper", EVERY_SHAPER)
+def test_a_machine_file_takes_every_shaper_with_its_options(shaper: str) -> None:
+    text = (
+        "axes:\n  x:\n    limits: {velocity_mm_s: 1, acceleration_mm_s2: 1}\n"
+        f"    modes: [{{frequency_hz: 30, damping_ratio: 0}}]\n    shaper: {{{shaper}}}\n"
+    )
+    setup = parse_machine(text.encode(), "m.yaml")
+    assert abs(setup.shapers["x"].amplitudes.sum() - 1.0) < 1e-12
+    assert parse_machine(dump_machine(setup).encode(), "m.yaml") == setup
+
+
+@pytest.mark.parametrize(
+    ("shaper", "column", "reason"),
+    [
+        ("type: sd, duration_periods: 0.2, max_amplitude: 1.5", 62, "shaper.max_amplitude: 0.2 damped periods are too"),
+        ("type: sd, duration_periods: -1", 42, "shaper.duration_periods: the duration must be positive"),
+        ("type: sd", 13, "shaper: sd takes one duration, not none"),
+        ("type: sd, duration_periods: 1, metric: width", 53, "metric: must be insensitivity or margin"),
+        ("type: virtual_mode, virtual_frequency_hz: -3", 56, "shaper.virtual_frequency_hz: the virtual frequency"),
+        ("type: multi_mode, derivatives: 1", 45, "derivatives: must be a list"),
+        ("type: zv, derivatives: 1.5", 37, "derivatives: must be a whole number"),
+    ],
+)  # fmt: skip
+def test_a_shaper_that_does_not_exist_is_refused_at_its_option(shaper: str, column: int, reason: str) -> None:
+    text = (
+        "axes:\n  x:\n    limits: {velocity_mm_s: 1, acceleration_mm_s2: 1}\n"
+        f"    modes: [{{frequency_hz: 30, damping_ratio: 0}}]\n    shaper: {{{shaper}}}\n"
+    )
+    error = refusal(text)
+    assert reason in error.reason
+    assert (error.line, error.column) == (5, column)
 
 
 def test_modes_that_leave_nothing_of_one_are_refused() -> None:

@@ -79,7 +79,9 @@ def subjects_of(
     corner = Corner(corner_speed, tolerance if corner_tolerance is None else corner_tolerance)
     for option, value in (("speed", corner.speed), ("tolerance", corner.tolerance)):
         if not (isfinite(value) and value > 0.0):
-            raise OptionError(f"the corner's {option} must be positive and finite, not {value:g}")
+            raise OptionError(
+                f"the corner's {option} must be positive and finite, not {value:g}", hint="leave it out"
+            )
     return subjects, corner
 
 
@@ -202,7 +204,9 @@ def _fitting(name: str, key: str, wanted: Any, value: object) -> object:
     if isinstance(value, list) and wanted is int:
         numbers = cast("list[int]", value)
         if len(numbers) > 1:
-            raise OptionError(f"{name} takes {_option(key)} once, not {len(numbers)} times")
+            raise OptionError(
+                f"{name} takes {_option(key)} once, not {len(numbers)} times", hint="it is for one mode"
+            )
         return numbers[0]
     return cast("object", value)
 

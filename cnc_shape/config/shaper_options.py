@@ -137,7 +137,7 @@ def design(choice: ShaperChoice, modes: Sequence[Mode]) -> Shaper:
     values = {options[key].parameter: options[key].value(given) for key, given in choice.options.items()}
     for key, option in options.items():
         if option.default is inspect.Parameter.empty and key not in choice.options:
-            raise OptionError(f"{choice.type} needs {key}", argument=option.parameter)
+            raise OptionError(f"{choice.type} needs {key}", hint=f"give {key}", argument=option.parameter)
     if choice.type in SINGLE_MODE:
         return function(modes[0], **values)
     if choice.type in MULTI_MODE:

@@ -144,7 +144,11 @@ def _periods(mode: Mode, duration: float | None, duration_periods: float | None)
     value = duration_periods if duration is None else duration / mode.damped_period
     assert value is not None
     if not (isfinite(value) and value > 0.0):
-        raise OptionError(f"the duration must be positive and finite, not {value:g}", argument=argument)
+        raise OptionError(
+            f"the duration must be positive and finite, not {value:g}",
+            hint="0.8 damped periods are short and robust",
+            argument=argument,
+        )
     if value > LONGEST:
         raise OptionError(
             f"a duration of {value:.4g} damped periods is longer than {LONGEST:g}",
@@ -177,7 +181,11 @@ def _check_bounds(
             argument="positive",
         )
     if not (isfinite(min_gap) and min_gap >= 0.0):
-        raise OptionError(f"the least gap must be 0 or more, not {min_gap:g} s", argument="min_gap")
+        raise OptionError(
+            f"the least gap must be 0 or more, not {min_gap:g} s",
+            hint="leave it out where impulses may be as close as they like",
+            argument="min_gap",
+        )
     if min_gap >= 0.5 * length:
         raise InfeasibleError(
             f"a gap of {min_gap:g} s does not fit twice into {length:.6g} s",

@@ -71,7 +71,9 @@ def virtual_mode(
     ((name, value),) = chosen.items()
     if not (isfinite(value) and value > 0.0):
         words = name.replace("_", " ")
-        raise OptionError(f"the {words} must be positive and finite, not {value:g}", argument=name)
+        raise OptionError(
+            f"the {words} must be positive and finite, not {value:g}", hint="check its unit", argument=name
+        )
     frequency = mode.natural_frequency
     if virtual_frequency is not None:
         angle = 2.0 * pi * frequency / (frequency + virtual_frequency)
