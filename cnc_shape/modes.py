@@ -69,6 +69,11 @@ class Mode:
             )
 
     @property
+    def is_uncertain(self) -> bool:
+        """Whether it says how far off it may be."""
+        return self.frequency_uncertainty > 0.0 or self.damping_uncertainty > 0.0
+
+    @property
     def omega(self) -> float:
         """Undamped angular frequency, rad/s."""
         return TWO_PI * self.natural_frequency

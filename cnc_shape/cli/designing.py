@@ -291,7 +291,7 @@ def _options(found: Design) -> dict[str, object]:
 
 
 def _titles(comparison: Comparison) -> list[str]:
-    return [title(found, _options(found)) for found in comparison.designs]
+    return [title(found.name, _options(found)) for found in comparison.designs]
 
 
 def _pareto_figure(subjects: Sequence[Subject], found: Mapping[tuple[Mode, ...], Comparison]) -> Figure:

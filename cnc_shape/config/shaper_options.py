@@ -96,7 +96,11 @@ def key_of(argument: str | None) -> str | None:
 def as_given(name: str, values: Mapping[str, object]) -> dict[str, object]:
     """Return arguments of the shaper's function as the options that a file would give: key: value."""
     options = {option.parameter: key for key, option in options_of(name).items()}
-    return {options[parameter]: _in_file(value) for parameter, value in values.items() if value is not None}
+    return {
+        options.get(parameter, parameter): _in_file(value)
+        for parameter, value in values.items()
+        if value is not None
+    }
 
 
 def _in_file(value: object) -> object:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -81,13 +81,24 @@ def design_json(
     return result
 
 
-def title(design: Design, options: Mapping[str, object]) -> str:
-    """The shaper's name with its options: ``sd duration_periods=0.8``."""
-    return " ".join([design.name, *(f"{key}={_word(value)}" for key, value in options.items())])
+# how an option is said, where its name and value alone are not how one says it
+SAID: Mapping[str, str] = {
+    "positive": "positive", "of": "of {}", "duration_periods": "{} periods", "duration_s": "{} s",
+    "max_amplitude": "|A| ≤ {}", "frequency_uncertainty": "±{}",
+}  # fmt: skip
+
+
+def title(name: str, options: Mapping[str, object]) -> str:
+    """The shaper's name with its options: ``sd 0.8 periods``; `options` by their keys."""
+    words = [SAID.get(key, key + " {}").format(_word(value)) for key, value in options.items()]
+    return ", ".join([" ".join([name, *words[:1]]), *words[1:]])
 
 
 def _word(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value).replace(" ", "")
+    if isinstance(value, list):
+        words = [_word(one) for one in cast("list[object]", value)]
+        return " ".join(words[:1] if len(set(words)) == 1 else words)
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def design_text(design: Design, options: Mapping[str, object], corner: Corner) -> str:
@@ -108,7 +119,7 @@ def design_text(design: Design, options: Mapping[str, object], corner: Corner) -
     cut = 1e3 * found.corner_smoothing(corner.speed)
     return "\n".join(
         [
-            one_line(f"{where}{title(design, options)} for {modes}"),
+            one_line(f"{where}{title(design.name, options)} for {modes}"),
             *impulses,
             f"  duration {1e3 * shaper.duration:.3f} ms, delay {1e3 * shaper.delay:.3f} ms",
             f"  vibration left at the design point {100.0 * max(found.residual_vibration):.2g} %",

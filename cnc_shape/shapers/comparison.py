@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 
@@ -17,7 +17,7 @@ from cnc_shape.shapers import (
     sd,
     virtual_mode,
 )
-from cnc_shape.shapers.measures import Assessment, assess
+from cnc_shape.shapers.measures import ASSUMED_FREQUENCY_ERROR, Assessment, assess
 from cnc_shape.shapers.shaper import Shaper
 
 EASY = 1.0 + 1e-9  # -, sum |A| of a shaper that never asks more of an axis than the command does
@@ -52,6 +52,14 @@ class Candidate:
 
     name: str
     make: partial[Shaper]  # of the modes it is for
+    known: Mapping[str, object] = field(default_factory=dict[str, object])  # of the modes, beside the model
+
+    @property
+    def options(self) -> dict[str, object]:
+        """What was asked for, as far as it is not the default."""
+        return {name: value for name, value in self.make.keywords.items() if value is not False} | dict(
+            self.known
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,10 +113,16 @@ def _for_several(modes: Sequence[Mode]) -> list[Candidate]:
 
 
 def _optimal(modes: Sequence[Mode]) -> list[Candidate]:
-    return [
-        Candidate("optimal", partial(optimal, modes)),
-        Candidate("optimal", partial(optimal, modes, positive=True)),
+    """The shortest for the modes as they are, and for modes as uncertain as is assumed of them."""
+    unsure = [
+        mode if mode.is_uncertain else replace(mode, frequency_uncertainty=ASSUMED_FREQUENCY_ERROR)
+        for mode in modes
     ]
+    found = [Candidate("optimal", partial(optimal, modes, positive=positive)) for positive in (False, True)]
+    if unsure != list(modes):
+        known = {"frequency_uncertainty": [mode.frequency_uncertainty for mode in unsure]}
+        found.append(Candidate("optimal", partial(optimal, unsure, positive=True), known))
+    return found
 
 
 def compare(
@@ -136,9 +150,7 @@ def compare(
             left_out.append(LeftOut(candidate.name, error.reason))
         else:
             assessment = assess(shaper, modes, tolerance)
-            designs.append(
-                Design(None, candidate.name, candidate.make.keywords, tuple(modes), shaper, assessment)
-            )
+            designs.append(Design(None, candidate.name, candidate.options, tuple(modes), shaper, assessment))
         advance(1.0 / len(offered))
     designs.sort(key=lambda design: design.shaper.duration)
     fastest, most_robust = _recommend(designs, tolerance)

@@ -76,13 +76,12 @@ def assess(shaper: Shaper, modes: Sequence[Mode], tolerance: float) -> Assessmen
 
 def model_error(shaper: Shaper, mode: Mode) -> ModelError:
     """Largest V over the range in which the mode may be; 10 % of frequency where it does not say."""
-    certain = mode.frequency_uncertainty == 0.0 and mode.damping_uncertainty == 0.0
-    frequency = ASSUMED_FREQUENCY_ERROR if certain else mode.frequency_uncertainty
+    frequency = mode.frequency_uncertainty if mode.is_uncertain else ASSUMED_FREQUENCY_ERROR
     ratio = np.linspace(1.0 - frequency, 1.0 + frequency, FREQUENCY_SCAN)
     spread = mode.damping_uncertainty
     damping = mode.damping_ratio * np.linspace(1.0 - spread, 1.0 + spread, DAMPING_SCAN if spread else 1)
     worst = vibration(shaper, mode.omega * ratio[:, None], damping[None, :]).max()
-    return ModelError(frequency, spread, certain, float(worst))
+    return ModelError(frequency, spread, not mode.is_uncertain, float(worst))
 
 
 def corner_cut(shaper: Shaper, power: int) -> float:
