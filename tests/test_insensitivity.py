@@ -61,6 +61,20 @@ def test_much_damping_leaves_the_band_open():
     assert_allclose(band.margin, 1.0 - band.low)
 
 
+@pytest.mark.parametrize(("damping", "opens"), [(0.3, False), (0.7, True), (0.99, True)])
+def test_the_scan_ends_early_only_where_nothing_can_follow(monkeypatch, damping, opens):
+    mode = Mode(1.0, damping)
+    shapers = [make_shaper([0.0, 0.4 * t, t], [0.3, 0.4, 0.3]) for t in np.linspace(0.3, 1.5, 25)]
+    times, amplitudes = np.array([s.times for s in shapers]), np.array([s.amplitudes for s in shapers])
+    early = bands(times, amplitudes, [mode], 0.32)
+    with monkeypatch.context() as patch:
+        patch.setattr("cnc_shape.shapers.insensitivity._Curve._calm", lambda _, rows, __: rows < 0)
+        whole = bands(times, amplitudes, [mode], 0.32)
+    assert (early[0] == whole[0]).all()
+    assert (early[1] == whole[1]).all()
+    assert np.isinf(early[1]).any() == opens
+
+
 def test_several_modes_move_together():
     pair = [Mode(30.0, 0.02), Mode(100.0, 0.01)]
     shaper = cascade(pair, of=zvd)

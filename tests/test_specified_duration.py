@@ -228,6 +228,7 @@ def test_bounds_are_kept_and_used():
     [
         ({}, OptionError, "one duration, not none"),
         ({"duration": 1.0, "duration_periods": 1.0}, OptionError, "not both"),
+        ({"duration": 0.0, "duration_periods": 1.0}, OptionError, "not both"),
         ({"duration": 0.0}, OptionError, "positive and finite, not 0"),
         ({"duration_periods": np.nan}, OptionError, "not nan"),
         ({"duration_periods": 20.0}, OptionError, "longer than 8"),

@@ -138,7 +138,22 @@ class _Curve:
             found[rows[crossed]] = self._refined(rows[crossed], inside[crossed], outside[crossed])
             rows = rows[~crossed]
             first += step * BLOCK  # the last two points are looked at again: humps have three
+            if direction > 0.0:
+                rows = rows[~self._calm(rows, first)]
         return found
+
+    def _calm(self, rows: IntArray, ratio: float) -> BoolArray:
+        """Whether V stays within the tolerance from `ratio` on: (n,).
+
+        ``V <= sum |A_i| exp(-zeta omega ratio (t_N - t_i))``, which only falls as the ratio grows.
+        """
+        times, amplitudes = self.times[rows], np.abs(self.amplitudes[rows])
+        before_last = times[:, -1:] - times
+        calm: BoolArray = np.ones(len(rows), dtype=np.bool_)
+        for mode in self.modes:
+            decay = np.exp(-ratio * mode.damping_ratio * mode.omega * before_last)
+            calm = calm & ((amplitudes * decay).sum(axis=1) <= self.tolerance)
+        return calm
 
     def _crossing(self, rows: IntArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The first point outside and the one before it, (n,) each; infinite where all are inside."""

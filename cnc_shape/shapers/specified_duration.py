@@ -137,7 +137,7 @@ def sd(
 def _periods(mode: Mode, duration: float | None, duration_periods: float | None) -> float:
     if (duration is None) == (duration_periods is None):
         raise OptionError(
-            f"sd takes one duration, not {'both' if duration else 'none'}",
+            f"sd takes one duration, not {'none' if duration is None else 'both'}",
             hint="give it in seconds or in damped periods of the mode: 0.8 periods are short and robust",
         )
     argument = "duration" if duration_periods is None else "duration_periods"
