@@ -308,6 +308,13 @@ def test_no_shorter_solution_by_another_solver(modes, positive):  # MINPACK from
     assert_allclose(shortest, shaper.duration, rtol=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("ratios", "shortest"), [((1.0, 10.0, 100.0), 0.23357590), ((1.0, 3.0, 30.0), 0.51666667)]
+)
+def test_modes_far_apart(ratios, shortest):  # the shortest of a search ten times as long
+    assert_allclose(multi_mode(undamped(*ratios)).duration, shortest, rtol=1e-6)
+
+
 def test_a_tight_bound_makes_it_longer():
     modes = undamped(1.0, 30.0)
     durations = [multi_mode(modes, max_amplitude=bound).duration for bound in (3.0, 2.0, 1.0, 0.6)]

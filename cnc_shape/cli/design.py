@@ -97,8 +97,9 @@ def design(
     duet_ei2 duet_ei3; and impulses of your own.
     """
     from cnc_shape.cli import designing
+    from cnc_shape.cli.subjects import subjects_of
 
-    subjects, corner = designing.subjects_of(
+    subjects, corner = subjects_of(
         frequency_hz or [], damping_ratio or [], frequency_uncertainty or [], damping_uncertainty or [],
         machine, corner_speed_mm_s, corner_tolerance_mm,
     )  # fmt: skip

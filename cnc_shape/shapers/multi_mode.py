@@ -21,12 +21,15 @@ DEFAULT_MAX_AMPLITUDE = 2.0  # -, the shortest shaper depends on this bound
 
 BATCH = 256  # starts solved together
 PATIENCE = 6  # batches without a shorter solution, for each time searched
+WIDE = 10.0  # -, fastest over slowest mode: wider apart they have more solutions, up to twice the patience
 MOST_BATCHES = 40  # in all, for each time searched
 EQUALLY_SPACED = 128  # starts of impulses at equal distances
 HORIZONS = (1.05, 2.1, 4.2)  # of the cascade's duration: where solutions are sought, in turn
 ELITE = 8  # shortest solutions whose neighbourhood is searched
 MOST_SHRUNK = 0.7  # -, a disturbed start is at least this long, relative
 DISTURBANCE = 0.25  # of the fastest period, standard deviation of each time
+PERIODS = 1.5  # of the fastest mode, by which a start moves, standard deviation
+SMALL_DISTURBANCE = 0.05  # of the fastest period, beside whole ones
 LOOKS = 8  # solutions polished per batch
 SAME = 1e-6  # of the slowest period: times of one and the same solution
 SEED = 20010  # the same shaper every time
@@ -211,8 +214,10 @@ def _shortest(rows: Conditions, demand: Demand, horizon: float) -> tuple[Solutio
     elite = np.empty((0, rows.impulses))
     without = 0
     batches = _equally_spaced(rows, horizon)
+    spread = float(rows.centres.imag.max() / rows.centres.imag.min())
+    patience = round(PATIENCE * min(max(spread / WIDE, 1.0), 2.0)) * rows.centres.size
     for _ in range(MOST_BATCHES * rows.centres.size):
-        if without == PATIENCE * rows.centres.size:
+        if without == patience:
             break
         limit = horizon if best is None else best.duration
         starts = next(batches, None)
@@ -248,17 +253,25 @@ def _equally_spaced(rows: Conditions, horizon: float) -> Iterator[FloatArray]:
 
 
 def _starts(random: np.random.Generator, elite: FloatArray, rows: Conditions, limit: float) -> FloatArray:
-    """Times (b,m), the first 0, from which to look for solutions no longer than `limit`."""
-    disturbed = BATCH // 2 if len(elite) else 0
-    fresh = limit * random.random((BATCH - disturbed, rows.impulses))
-    if disturbed:
+    """Times (b,m), the first 0, from which to look for solutions no longer than `limit`.
+
+    Half of them are symmetric in time, as light damping likes it. Those near known solutions keep what these
+    do to the fastest mode where they move by whole periods of it.
+    """
+    near = BATCH // 2 if len(elite) else 0
+    starts = limit * random.random((BATCH - near, rows.impulses))
+    if near:
         fastest = 2.0 * pi / float(rows.centres.imag.max())
-        chosen = elite[random.integers(len(elite), size=disturbed)]
-        shrunk = chosen * random.uniform(MOST_SHRUNK, 1.0, (disturbed, 1))
-        moved = shrunk + DISTURBANCE * fastest * random.standard_normal(shrunk.shape)
-        fresh = np.concatenate([fresh, moved])
-    fresh.sort(axis=1)
-    return fresh - fresh[:, :1]
+        chosen = elite[random.integers(len(elite), size=near)]
+        shrunk = chosen * random.uniform(MOST_SHRUNK, 1.0, (near, 1))
+        shrunk += DISTURBANCE * fastest * random.standard_normal(chosen.shape)
+        periods = np.rint(PERIODS * random.standard_normal(chosen.shape)) * fastest
+        moved = chosen + periods + SMALL_DISTURBANCE * fastest * random.standard_normal(chosen.shape)
+        starts = np.concatenate([starts, np.where(np.arange(near)[:, None] % 4 < 2, shrunk, moved)])
+    starts.sort(axis=1)
+    starts -= starts[:, :1]
+    starts[::2] = 0.5 * (starts[::2] + starts[::2, -1:] - starts[::2, ::-1])
+    return starts
 
 
 def _ordered(times: FloatArray, amplitudes: FloatArray) -> tuple[FloatArray, FloatArray]:

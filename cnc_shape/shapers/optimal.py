@@ -344,12 +344,12 @@ def _nothing_found(
     within = f"within {LONGEST:g} periods of the slowest mode ({longest:.4g} s)"
     if max_amplitude is not None:
         return InfeasibleError(
-            f"no impulses of {max_amplitude:g} at most do it {within}",
+            f"no impulses of {max_amplitude:g} at most were found that do it {within}",
             hint="allow a larger amplitude, or more vibration",
             argument="max_amplitude",
         )
     return InfeasibleError(
-        f"no impulses leave as little as {demands.tolerance:g} of the vibration {within}",
+        f"no impulses were found that leave as little as {demands.tolerance:g} of the vibration {within}",
         hint="allow more vibration, or less uncertainty",
         argument="vibration_tolerance",
     )
