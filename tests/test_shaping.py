@@ -8,13 +8,15 @@ from commands import part, point_to_point, straight, trapezoid
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cnc_shape.modes import Mode
-from cnc_shape.shapers import MULTI_MODE, SINGLE_MODE, cascade, make_shaper, zv, zvd
+from cnc_shape.shapers import MULTI_MODE, PLAIN, cascade, make_shaper, sd, virtual_mode, zv, zvd
 from cnc_shape.shapers.shaping import common_delay, shape, shaping
 
 T = 1e-3
 MODE = Mode(33.7, 0.02)
 SHAPERS = {
-    **{name: make(MODE) for name, make in SINGLE_MODE.items()},
+    **{name: make(MODE) for name, make in PLAIN.items()},
+    "virtual_mode": virtual_mode(Mode(MODE.natural_frequency, 0.0), duration_periods=0.4),
+    "sd": sd(MODE, duration_periods=0.8),
     **{n: make([MODE]) for n, make in MULTI_MODE.items()},
 }
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PANEL, LETTER = (470.0, 245.0), (4.2, 9.0)  # points, about: a panel of the comparison, a letter in it
 PERIODS_SHOWN = 4.0  # of the slowest mode, after the last impulse
 LEVELS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)  # -, V of the contour lines
 MOST_DAMPING = 0.3  # -, of the surface
@@ -109,18 +110,36 @@ def _draw_pareto(axes: Axes, designs: Sequence[Design], titles: Sequence[str]) -
         [durations[row] for row in front], [margins[row] for row in front], drawstyle="steps-post",
         color=PATH_COLOUR, linewidth=0.8, zorder=1,
     )  # fmt: skip
-    for row, name in enumerate(titles):
+    for row in range(len(designs)):
         axes.plot(
             durations[row], margins[row], "o" if easy[row] else "s", color=COLOURS[1 if easy[row] else 0],
             markersize=5.0 if row in front else 3.5,
         )  # fmt: skip
-        axes.annotate(
-            name, (durations[row], margins[row]), xytext=(4.0, 3.0), textcoords="offset points", fontsize=7.5
-        )
     for kind, colour, label in (("o", COLOURS[1], "positive impulses"), ("s", COLOURS[0], "Σ|A| above 1")):
         axes.plot([], [], kind, color=colour, markersize=5.0, label=label)
     axes.legend(loc="lower right")
     axes.set_xlabel("duration (ms)")
     axes.set_ylabel("frequency may be off by (%)")
-    axes.set_ylim(0.0, 1.08 * max(margins))
-    axes.set_xlim(0.0, 1.25 * max(durations))  # names stand to the right of their points
+    width, height = 1.25 * max(durations), 1.08 * max(max(margins), 1.0)  # names stand right of their points
+    axes.set_xlim(0.0, width)
+    axes.set_ylim(0.0, height)
+    for row, rise in enumerate(_rises(durations, margins, titles, width, height)):
+        axes.annotate(
+            titles[row], (durations[row], margins[row]), xytext=(4.0, 3.0 + rise), textcoords="offset points",
+            fontsize=7.5,
+        )  # fmt: skip
+
+
+def _rises(
+    x: Sequence[float], y: Sequence[float], names: Sequence[str], width: float, height: float
+) -> list[float]:
+    """How far each name is raised, points, so that none lies on an earlier one."""
+    placed, rises = list[tuple[float, float, float]](), list[float]()
+    for left, bottom, name in zip(x, y, names, strict=True):
+        start, level, rise = left / width * PANEL[0], bottom / height * PANEL[1], 0.0
+        end = start + LETTER[0] * len(name)
+        while any(start < e and s < end and abs(level + rise - at) < LETTER[1] for s, e, at in placed):
+            rise += 1.0
+        placed.append((start, end, level + rise))
+        rises.append(rise)
+    return rises
