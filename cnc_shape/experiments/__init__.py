@@ -1,0 +1,1 @@
+"""Experiments: the papers' tables and figures, run again; one package a paper."""
