@@ -105,7 +105,7 @@ def design(
 
     Shapers: zv zvd zvdd zvddd umzv mzv ei 2hump_ei 3hump_ei virtual_mode sd; for several modes cascade,
     multi_mode and optimal; as firmwares compute them klipper_ei klipper_2hump_ei klipper_3hump_ei fitted_ei
-    duet_ei2 duet_ei3; and impulses of your own.
+    duet_ei2 duet_ei3; and impulses of your own. --emit hands the result to a controller.
     """
     from cnc_shape.cli import designing, emitting
     from cnc_shape.cli.subjects import subjects_of

@@ -13,6 +13,7 @@ from cnc_shape.shapers import PLAIN, Shaper, duet_ei2, duet_ei3
 from cnc_shape.writers.firmware.handover import (
     Family,
     Handover,
+    check_apart,
     check_impulses,
     decimal,
     family_of,
@@ -58,14 +59,12 @@ def rrf(handovers: Sequence[Handover]) -> str:
             f"{RRF} needs all amplitudes but the last to add up to less than 1, not {amplitudes.sum():.6g}",
             hint="design a shaper that ends with a positive impulse: --positive",
         )
-    clocks = np.rint(handover.shaper.times * CLOCK)
-    if (np.diff(clocks) <= 0.0).any():
-        raise InfeasibleError(
-            f"two impulses are closer than the step clock of {RRF}, {1e6 / CLOCK:.3g} us",
-            hint="design it with --min-gap-s, or with fewer impulses",
-        )
-    made = _completed(amplitudes, clocks / CLOCK)
-    return _text(handover, made, amplitudes, _printed(made.times[1:], TIME_DIGITS))
+    times = np.rint(handover.shaper.times * CLOCK) / CLOCK
+    check_apart(times, RRF, f"a step clock of {1e6 / CLOCK:.3g} us")
+    rounding = f"rounding to {1e6 / CLOCK:.3g} us"
+    return _text(
+        handover, _completed(amplitudes, times), amplitudes, _printed(times[1:], TIME_DIGITS), rounding
+    )
 
 
 def rrf_3_4(handovers: Sequence[Handover]) -> str:
@@ -76,7 +75,7 @@ def rrf_3_4(handovers: Sequence[Handover]) -> str:
     OptionError
         Axes whose shapers differ, or nothing to shape.
     InfeasibleError
-        More than 5 impulses, frequencies outside 5.8 to 1000 Hz, negative impulses.
+        More than 5 impulses, frequencies outside 5.8 to 1000 Hz, negative impulses, or two at one time.
     """
     handover = _the_one(handovers)
     _check(handover, RRF_3_4, LOWEST_3_4)
@@ -88,7 +87,8 @@ def rrf_3_4(handovers: Sequence[Handover]) -> str:
         )
     segments = _printed(np.diff(handover.shaper.times), TIME_DIGITS)
     made = _completed(np.diff([0.0, *sums]), np.append(0.0, np.cumsum(segments)))
-    return _text(handover, made, sums, segments)
+    check_apart(made.times, RRF_3_4, f"{10 ** (6 - TIME_DIGITS):g} us")
+    return _text(handover, made, sums, segments, "rounding to the digits printed")
 
 
 def _the_one(handovers: Sequence[Handover]) -> Handover:
@@ -128,7 +128,7 @@ def _completed(amplitudes: FloatArray, times: FloatArray) -> Shaper:
     return Shaper(times=frozen(times), amplitudes=frozen(np.append(amplitudes, 1.0 - amplitudes.sum())))
 
 
-def _text(handover: Handover, made: Shaper, heights: FloatArray, times: FloatArray) -> str:
+def _text(handover: Handover, made: Shaper, heights: FloatArray, times: FloatArray, rounding: str) -> str:
     """By name where the firmware's own shaper is the one designed, else impulse by impulse."""
     lines = [f"{subject(handover)}; for all axes"]
     family = family_of(handover)
@@ -137,12 +137,13 @@ def _text(handover: Handover, made: Shaper, heights: FloatArray, times: FloatArr
         mode = handover.modes[0]
         own = _own(family, mode)
         if mode.damping_ratio <= MOST_DAMPING and _alike(own, handover.shaper):
-            lines.append(f"{remark(handover, own)}, by rounding to {1e6 / CLOCK:.3g} us steps")
+            lines.append(remark(handover, own, rounding))
             frequency = decimal(mode.natural_frequency, MODE_DIGITS)
             damping = decimal(mode.damping_ratio, MODE_DIGITS)
             return _with_comments(lines, f'M593 P"{word}" F{frequency} S{damping}')
-        lines.append(f'impulse by impulse: P"{word}" would leave {percent(left(own, handover.modes))}')
-    lines.append(f"{remark(handover, made)}, by rounding to {1e6 / CLOCK:.3g} us steps")
+        reverse = ", in releases that reverse it" if family is Family.MZV else ""
+        lines.append(f'impulse by impulse: P"{word}" leaves {percent(left(own, handover.modes))}{reverse}')
+    lines.append(remark(handover, made, rounding))
     h = ":".join(decimal(height, AMPLITUDE_DIGITS) for height in heights.tolist())
     t = ":".join(decimal(time, TIME_DIGITS) for time in times.tolist())
     return _with_comments(lines, f'M593 P"custom" H{h} T{t}')
@@ -156,7 +157,7 @@ def _own(family: Family, mode: Mode) -> Shaper:
     """The shaper that the firmware makes of F and S.
 
     All times are fractions of the damped period in whole clocks, those of EI too, whose fits are for the
-    undamped one; releases up to 3.6 give the impulses of mzv in reverse.
+    undamped one. Some releases give the impulses of mzv in reverse: theirs is taken here.
     """
     period = float(np.rint(CLOCK * mode.damped_period))
     zeta = mode.damping_ratio

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import TypeAlias
 
+import numpy as np
+
+from cnc_shape.arrays import FloatArray
 from cnc_shape.errors import InfeasibleError, OptionError
 from cnc_shape.modes import Mode
 from cnc_shape.shapers import Shaper
@@ -98,7 +101,7 @@ def left(shaper: Shaper, modes: Sequence[Mode]) -> float:
 
 def percent(vibration: float) -> str:
     """V in per cent, for a person."""
-    return f"{100.0 * vibration:.3g} %" if vibration > NOTHING else "0 %"
+    return f"{100.0 * vibration:.4g} %" if vibration > NOTHING else "0 %"
 
 
 def decimal(value: float, digits: int) -> str:
@@ -115,12 +118,15 @@ def subject(handover: Handover) -> str:
     return f"{where}{handover.name}{' for ' if modes else ''}{modes}, {size}"
 
 
-def remark(handover: Handover, made: Shaper) -> str:
+def remark(handover: Handover, made: Shaper, because: str) -> str:
     """What is left of the vibration with the shaper as the controller makes it, and with the one designed."""
     if not handover.modes:
-        return "as given; no modes are known to tell what is left of"
+        return "there is no mode to tell what is left of"
     ours, theirs = left(handover.shaper, handover.modes), left(made, handover.modes)
-    return f"leaves {percent(theirs)} of the vibration as the controller has it, {percent(ours)} as designed"
+    change = (
+        "" if abs(theirs - ours) <= NOTHING else f": {because} changes it by {100.0 * (theirs - ours):+.2g} points"
+    )
+    return f"leaves {percent(theirs)} of the vibration, designed for {percent(ours)}{change}"
 
 
 def check_impulses(handover: Handover, controller: str) -> None:
@@ -141,6 +147,21 @@ def check_impulses(handover: Handover, controller: str) -> None:
             f"{place(handover)}{controller} takes at most {MOST_IMPULSES} impulses, "
             f"not the {count} of {handover.name}",
             hint=f"design it with at most {MOST_IMPULSES} impulses: zvddd, 3hump_ei, multi_mode or optimal",
+        )
+
+
+def check_apart(times: FloatArray, controller: str, resolution: str) -> None:
+    """Refuse impulses that fall on one another where a controller rounds their times.
+
+    Raises
+    ------
+    InfeasibleError
+        `times`, rounded, do not increase.
+    """
+    if (np.diff(times) <= 0.0).any():
+        raise InfeasibleError(
+            f"two impulses are closer than {controller} can tell apart, {resolution}",
+            hint="design a shaper with fewer impulses, or sd with --min-gap-s",
         )
 
 

@@ -27,6 +27,7 @@ from cnc_shape.writers.firmware.handover import (
     MOST_IMPULSES,
     Family,
     Handover,
+    check_apart,
     check_axis,
     check_impulses,
     decimal,
@@ -109,7 +110,7 @@ def klipper_custom(handovers: Sequence[Handover]) -> str:
     OptionError
         An axis that is not shaped, or nothing to shape.
     InfeasibleError
-        More than 5 impulses, one smaller than 0.001, a duration outside 0.001 to 0.2 s.
+        More than 5 impulses, one smaller than 0.001, two at one time, a duration outside 0.001 to 0.2 s.
     """
     return _section(handovers, _impulses)
 
@@ -139,7 +140,7 @@ def _typed(handover: Handover, axis: str) -> tuple[list[str], list[str]]:
             f"not {mode.damping_ratio:g}",
             hint=f"use {_nearest_for(mode.damping_ratio)}, or --emit klipper-custom",
         )
-    said = [remark(handover, kind.own(mode))]
+    said = [remark(handover, kind.own(mode), "Klipper's own formula")]
     if kind.older is not None and mode.damping_ratio > 0.0:
         older = percent(left(kind.older(mode), handover.modes))
         said.append(f"older Klippers, which scale the undamped shaper, leave {older}")
@@ -232,7 +233,8 @@ def _impulses(handover: Handover, axis: str) -> tuple[list[str], list[str]]:
     )
     amplitudes = ",".join(decimal(a, DIGITS) for a in made.amplitudes.tolist())
     times = ",".join(decimal(t, DIGITS) for t in made.times.tolist())
-    return [remark(handover, made)], [
+    check_apart(made.times, CUSTOM, "1 ns")
+    return [remark(handover, made, "rounding to the digits printed")], [
         f"shaper_type_{axis}: custom",
         f"shaper_a_{axis}: {amplitudes}",
         f"shaper_t_{axis}: {times}",

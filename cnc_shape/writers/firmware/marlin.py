@@ -68,7 +68,7 @@ def marlin(handovers: Sequence[Handover]) -> str:
         echo = round(STEPS * float(handover.shaper.amplitudes[1])) / STEPS
         made = Shaper(times=frozen([0.0, 0.5 / frequency]), amplitudes=frozen([1.0 - echo, echo]))
         comments.append(subject(handover))
-        comments.append(f"{remark(handover, made)}, by counting amplitudes in {STEPS}ths")
+        comments.append(remark(handover, made, f"counting amplitudes in {STEPS}ths"))
         if damping > 0.0:
             comments.append("F is the damped frequency, whose half period Marlin puts between the impulses")
         if frequency <= TICKS:
@@ -143,7 +143,7 @@ def marlin_ft(handovers: Sequence[Handover]) -> str:
         step = round(kind.step * mode.damped_period / SAMPLE_TIME) * SAMPLE_TIME
         made = Shaper(times=frozen(step * np.arange(own.times.size)), amplitudes=own.amplitudes)
         comments.append(subject(handover))
-        comments.append(f"{remark(handover, made)}, by its formula and rounding to {1e3 * SAMPLE_TIME:g} ms")
+        comments.append(remark(handover, made, f"Marlin's formula, rounded to {1e3 * SAMPLE_TIME:g} ms,"))
         if mode.natural_frequency < LOWEST_NEWER:
             comments.append(f"newer versions take A from {LOWEST_NEWER:g} Hz: lower FTM_MIN_SHAPE_FREQ")
         if mode.damping_ratio < LEAST_OLDER_DAMPING:
