@@ -535,6 +535,7 @@ def damped_by(zeta):
         ("marlin-ft", ["zv", *HZ, "--axis", "a"], "shapes x, y, z, not a"),
         ("rff", ["zvd", *HZ], "knows no 'rff'\nhint: use one of rrf, rrf-3.4, klipper"),
         ("rrf", HZ, "one shaper, not a comparison\nhint: name the shaper"),
+        ("rrf", ["--damping-ratio", "0.1"], "one shaper, not a comparison"),
         ("rrf", ["--plot", "shapers.svg"], "one shaper, not a comparison"),
         ("rrf", ["--duration-s", "0.1"], "--duration-s is an option of a shaper"),
         ("json", [], "json is the result of a design"),

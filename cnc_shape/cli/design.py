@@ -122,7 +122,7 @@ def design(
     given = {key: value for key, value in options.items() if value is not None}
     drawing = designing.drawing_at(plot, force=force)
     if shaper is None and target is not None:
-        if frequency_hz or plot is not None:
+        if frequency_hz or damping_ratio or frequency_uncertainty or damping_uncertainty or plot is not None:
             raise emitting.no_shaper()
         designing.refuse_options(given)
         emitting.hand_over_configured(machine, axis, target, json=json)

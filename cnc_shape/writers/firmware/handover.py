@@ -123,10 +123,9 @@ def remark(handover: Handover, made: Shaper, because: str) -> str:
     if not handover.modes:
         return "there is no mode to tell what is left of"
     ours, theirs = left(handover.shaper, handover.modes), left(made, handover.modes)
-    change = (
-        "" if abs(theirs - ours) <= NOTHING else f": {because} changes it by {100.0 * (theirs - ours):+.2g} points"
-    )
-    return f"leaves {percent(theirs)} of the vibration, designed for {percent(ours)}{change}"
+    change = theirs - ours
+    why = f": {because} changes it by {100.0 * change:+.2g} points" if abs(change) > NOTHING else ""
+    return f"leaves {percent(theirs)} of the vibration, designed for {percent(ours)}{why}"
 
 
 def check_impulses(handover: Handover, controller: str) -> None:
