@@ -421,3 +421,19 @@ def ideal_tool(command, axis):
             state = S @ [state[0], state[1], start, (end - start) / T]
         tool[-1] += state[0]
     return tool
+
+
+# --- live shaping ---------------------------------------------------------------------------------
+
+
+def filtered(samples, weights):
+    """FIR filter of one axis, from rest at the first sample to rest at the last: the sum as it is written."""
+    longest = len(weights) - 1
+    out = []
+    for n in range(len(samples) + longest):
+        total = 0.0
+        for k, weight in enumerate(weights):
+            if weight != 0.0:
+                total += weight * samples[min(max(n - k, 0), len(samples) - 1)]
+        out.append(total)
+    return np.array(out)
