@@ -24,6 +24,7 @@ SCRIPTS = (
     "look_ahead",
     "sampling",
     "shaping",
+    "live_shaping",
     "servo_loop",
     "contour_error",
     "whole_chain",
