@@ -1,8 +1,7 @@
 """Live shaping of three axes, one sample at a time, against numpy with the same taps.
 
-A cascade for two modes is nine taps in 24 samples. numpy's way to answer one sample is a dot product with a
-window of the last ones, axis by axis or all at once with a matrix; ``np.convolve`` is told beside it: it has
-all samples from the start and answers none of them before the last has come.
+numpy answers one sample by dot products of each axis's last ones with its taps. ``np.convolve`` is told
+beside it: it has all samples from the start and answers none of them before the last has come.
 """
 
 from __future__ import annotations

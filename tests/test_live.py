@@ -165,7 +165,7 @@ def vibration_left(positions, sample_time, mode):
 
 @pytest.mark.parametrize(
     ("way", "left"),
-    [(Interpolation.ROUNDED, 1.7e-2), (Interpolation.LINEAR, 1.6e-3), (Interpolation.CUBIC, None), (Interpolation.EXACT, 0.0)],
+    [(Interpolation.ROUNDED, 1.75e-2), (Interpolation.LINEAR, 1.55e-3), (Interpolation.CUBIC, 1.23e-5), (Interpolation.EXACT, 0.0)],
 )  # fmt: skip
 def test_residual_vibration_after_a_streamed_move(way, left):
     # ZV for 33.7 Hz and 2 per cent, every millisecond, relative to the unshaped move at the same instant
@@ -177,8 +177,7 @@ def test_residual_vibration_after_a_streamed_move(way, left):
     s = MODE.omega * complex(MODE.damping_ratio, np.sqrt(1 - MODE.damping_ratio**2))
     weights = wanted.taps[0].weights
     assert_allclose(ratio, abs(weights @ np.exp(s * T * np.arange(weights.size))), atol=1e-8)
-    if left is not None:
-        assert_allclose(ratio, left, rtol=0.05, atol=1e-8)
+    assert_allclose(ratio, left, rtol=5e-3, atol=1e-8)
 
 
 @EACH

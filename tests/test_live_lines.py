@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import selectors
 import signal
 import subprocess
@@ -295,3 +296,12 @@ def test_the_machine_that_is_bundled_streams(monkeypatch, capfd):
     wanted = filters(setup.acting_shapers, ("x", "y"), 1e-3, Interpolation.EXACT, modes)
     assert_array_equal(rows[1:, 1:], shape_samples(positions, wanted)[1:])
     assert said == ""
+
+
+def test_the_example_of_the_document(monkeypatch, capfd):
+    monkeypatch.delenv("CNC_SHAPE_MACHINE", raising=False)
+    document = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    given, shown = re.search(r"printf '(.*)' \| .* \| head -4\n(.*?)```", document, re.DOTALL).groups()
+    feed(monkeypatch, given.replace("\\n", "\n"))
+    assert run(["apply", "--stream"]) == 0
+    assert capfd.readouterr().out.splitlines()[:4] == shown.splitlines()
