@@ -71,16 +71,16 @@ def apply(
     target = _target(file, output, force=force)
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    shapers = setup.acting_shapers
+    kind = setup.planning.shaping
     with (
-        open_motion(file, setup, options) as motion,
+        open_motion(file, setup, options, [setup.timing(kind)]) as motion,
         progress("applying", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)
-        work = Application(blocks, setup.machine, shapers, setup.control.sample_time)
+        work = Application(blocks, setup.machine, setup.command_shaping(kind), setup.control.sample_time)
         _write(work, target, force=force)
         done = work.summary()
-    notes = [] if shapers else ["this machine has no shapers: the command is written unshaped"]
+    notes = [] if setup.acting_shapers else ["this machine has no shapers: the command is written unshaped"]
     warn([*motion.warnings(), *notes], quiet=quiet)
     if json:
         print_json("apply", _result(done, target))
