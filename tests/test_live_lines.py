@@ -305,3 +305,26 @@ def test_the_example_of_the_document(monkeypatch, capfd):
     feed(monkeypatch, given.replace("\\n", "\n"))
     assert run(["apply", "--stream"]) == 0
     assert capfd.readouterr().out.splitlines()[:4] == shown.splitlines()
+
+
+def test_a_stream_shapes_the_axes_whatever_a_planned_motion_would_be_shaped_by(place, monkeypatch, capfd):
+    positions = move()
+    for planning in ("shaping: contour", "shaping: axis", "shaping: path"):
+        (place / "soft.yaml").write_text(MACHINE + f"planning: {{{planning}}}\n")
+        _, rows, _ = streamed(monkeypatch, capfd, table(positions))
+        assert_array_equal(rows[1:, 1:], expected(positions)[1:])
+    (place / "soft.yaml").write_text(MACHINE + "planning: {shaping: none}\n")
+    _, rows, said = streamed(monkeypatch, capfd, table(positions))
+    assert_array_equal(rows[:, 1:], positions)
+    assert "no shapers" in said
+
+
+def test_axes_need_not_wait_for_each_other(place, monkeypatch, capfd):
+    (place / "soft.yaml").write_text(MACHINE + "planning: {shaping: axis, align: false}\n")
+    positions = move()
+    _, rows, _ = streamed(monkeypatch, capfd, table(positions))
+    setup = load_machine("soft.yaml")
+    modes = {axis.name: axis.modes for axis in setup.machine.axes}
+    wanted = filters(setup.acting_shapers, ("x", "a"), 1e-3, Interpolation.EXACT, modes, aligned=False)
+    assert_array_equal(rows[1:, 1:], shape_samples(positions, wanted)[1:])
+    assert np.any(rows[1:, 1] != expected(positions)[1 : len(rows), 0])

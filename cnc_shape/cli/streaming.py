@@ -133,15 +133,16 @@ def _filters(lines: SampleLines, wanted: _Wanted, sample_time: float) -> Filters
     """Put the machine's shapers on the grid: exactly, or linearly where nobody asked and none is exact."""
     shapers = wanted.setup.acting_shapers
     modes = {axis.name: axis.modes for axis in wanted.setup.machine.axes}
+    aligned = wanted.setup.planning.aligned
     way = wanted.interpolation or Interpolation.EXACT
     try:
-        made = filters(shapers, lines.axes, sample_time, way, modes)
+        made = filters(shapers, lines.axes, sample_time, way, modes, aligned=aligned)
     except InfeasibleError as error:
         if wanted.interpolation is not None:
             raise
         warn([f"{error.reason}: they are linear"], quiet=wanted.quiet)
         way = Interpolation.LINEAR
-        made = filters(shapers, lines.axes, sample_time, way, modes)
+        made = filters(shapers, lines.axes, sample_time, way, modes, aligned=aligned)
     shaped = [mode for axis in lines.axes if axis in shapers for mode in modes.get(axis, ())]
     told = coarse(way, sample_time, shaped)
     warn([] if told is None else [told], quiet=wanted.quiet)
