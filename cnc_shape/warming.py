@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from cnc_shape.applying import Application
 from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.cases import default_cases, timings
@@ -26,6 +28,8 @@ from cnc_shape.pipeline import run
 from cnc_shape.readers import ReadingOptions, read_program, reading
 from cnc_shape.readers.source import COMPILED_FROM
 from cnc_shape.recording.extremes import BUCKETS
+from cnc_shape.shapers.discretisation import Interpolation
+from cnc_shape.shapers.live import LiveShaper, filters
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.writers.points import points_file, points_of
@@ -79,6 +83,7 @@ def warm() -> Iterator[int]:
                     yield compiled_count()
         _certify(Path(folder) / "lines.nc", machines[0])
         _thin(Path(folder) / "long.nc", machines[0])
+        _stream(machines[0])
         yield compiled_count()
 
 
@@ -114,6 +119,12 @@ def _thin(path: Path, setup: Setup) -> None:
     path.write_text(LONG.format(seconds=SAMPLES * setup.control.sample_time))
     with open_motion(str(path), setup) as motion:
         run(motion.blocks, setup, default_cases(setup)[:1], motion.name, record=True)
+
+
+def _stream(setup: Setup) -> None:
+    sample_time = setup.control.sample_time
+    wanted = filters(setup.acting_shapers, ("x", "y"), sample_time, Interpolation.LINEAR, {})
+    LiveShaper(wanted).push(np.zeros(2))
 
 
 def _certify(path: Path, setup: Setup) -> None:

@@ -423,6 +423,7 @@ def ideal_tool(command, axis):
     return tool
 
 
+<<<<<<< HEAD
 # contour and path shaping
 
 
@@ -466,3 +467,19 @@ def along_path(travelled, speed, acceleration, start, length, rows):
         pushed = [p.deriv()(s) * a + p.deriv(2)(s) * v**2 for p in cubic]
         out.append((position, velocity, pushed))
     return tuple(np.array(values) for values in zip(*out, strict=True))
+=======
+# --- live shaping ---------------------------------------------------------------------------------
+
+
+def filtered(samples, weights):
+    """FIR filter of one axis, from rest at the first sample to rest at the last: the sum as it is written."""
+    longest = len(weights) - 1
+    out = []
+    for n in range(len(samples) + longest):
+        total = 0.0
+        for k, weight in enumerate(weights):
+            if weight != 0.0:
+                total += weight * samples[min(max(n - k, 0), len(samples) - 1)]
+        out.append(total)
+    return np.array(out)
+>>>>>>> stream

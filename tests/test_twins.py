@@ -29,6 +29,7 @@ TWINS = {
     "kernels/plain_rows.py": ("read_rows", "test_plain_rows.py"),  # the reader in Python
     "kernels/polyline.py": ("naive.tangent_polygon", "test_polyline.py"),
     "kernels/progress.py": ("naive.along_path", "test_path_shaping.py"),
+    "kernels/ring.py": ("naive.filtered", "test_live.py"),
     "kernels/sampling.py": ("naive.samples", "test_trajectory.py"),
     "kernels/speed_limits.py": ("naive.speed_limits", "test_feedrate.py"),
     "kernels/sums.py": ("naive.squares", "test_sums.py"),
