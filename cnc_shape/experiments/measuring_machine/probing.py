@@ -85,7 +85,7 @@ def approach_start(shaper: Shaper) -> float:
 
 def whole_cycle(shaper: Shaper) -> StraightMotion:
     """Gross move, pause, approach and retract, shaped; each begins when the one before has ended."""
-    approach = move(*APPROACH, start=GROSS.end + shaper.duration + PAUSE)
+    approach = move(*APPROACH, start=approach_start(shaper))
     retract = move(*RETRACT, start=approach.end + shaper.duration)
     return joined([part.shaped(shaper) for part in (GROSS, approach, retract)])
 
@@ -107,7 +107,9 @@ def machine_run() -> Run:
 
 
 def deflection(case: str) -> tuple[FloatArray, FloatArray]:
-    """Time, s, and deflection of the probe in X, mm, of a case of `machine_run`."""
+    """Time, s, and deflection of the probe in X, mm, of a case of `machine_run`, to half a second after it."""
     signals = machine_run().signal(case)
     column = signals.axes.index("x")
-    return signals.time, signals.tool[:, column] - signals.position[:, column]
+    during = signals.tool[:, column] - signals.position[:, column]
+    time = np.concatenate([signals.time, signals.time[-1] + signals.settling_time[1:]])
+    return time, np.concatenate([during, signals.settling[1:, column]])
