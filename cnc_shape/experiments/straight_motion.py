@@ -44,7 +44,10 @@ class StraightMotion:
         return 0.5 * np.maximum(time[:, None] - self.times, 0.0) ** 2 @ self.changes
 
     def deflection(self, modes: Sequence[Mode], time: FloatArray) -> FloatArray:
-        """Deflection of the tool, mm: ``y'' + 2 zeta omega y' + omega^2 y = -g a`` for every mode, exactly."""
+        """Deflection of the tool, mm, exactly.
+
+        Every mode obeys ``y'' + 2 zeta omega y' + omega^2 y = -g a``, g its participation.
+        """
         found = np.zeros(time.size)
         for mode in modes:
             give = mode.participation / mode.omega**2

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cnc_shape.arrays import FloatArray
 from cnc_shape.report.style import WIDTH, new_figure
 
@@ -23,9 +25,7 @@ def surface_figure(
     view: tuple[float, float],
 ) -> Figure:
     """Draw z (m,n) over x (n,) and y (m,); `view` is elevation and azimuth in degrees."""
-    import numpy as np
-
-    figure, (flat,) = new_figure(0.8 * WIDTH, 4.4)
+    figure, (flat,) = new_figure(0.8 * WIDTH, 4.0)
     flat.remove()
     axes: Any = figure.add_subplot(projection="3d")
     axes.plot_surface(
@@ -33,7 +33,9 @@ def surface_figure(
     )
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color(FLAT)
+    for name in ("x", "y", "z"):
+        axes.locator_params(axis=name, nbins=5)
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel=labels[2], title=title)
     axes.view_init(elev=view[0], azim=view[1])
-    axes.set_box_aspect(None, zoom=0.86)
+    axes.set_box_aspect(None, zoom=0.92)
     return figure

@@ -107,7 +107,7 @@ def machine_run() -> Run:
 
 
 def deflection(case: str) -> tuple[FloatArray, FloatArray]:
-    """Time, s, and deflection of the probe in X, mm, of a case of `machine_run`, to half a second after it."""
+    """Time, s, and deflection of the probe in X, mm, in a case of `machine_run` and half a second after."""
     signals = machine_run().signal(case)
     column = signals.axes.index("x")
     during = signals.tool[:, column] - signals.position[:, column]

@@ -72,9 +72,11 @@ def interval_table() -> Table:
     return Table(
         "Section 2.2, Figs. 5 and 6: real-time shaping, ZV, undamped",
         tuple(rows),
-        "The paper says that a small interval is better and a ramp close to the interval shakes less, without "
+        "The paper says that a small interval is better and a ramp close to the interval shakes less, "
+        "without "
         "numbers. The first is right for rounded impulses, V = sin(πΔ/2T) at worst; dividing an impulse "
-        "between its two neighbours leaves the square of that, solving for the amplitudes again leaves nothing. "
+        "between its two neighbours leaves the square of that, solving for the amplitudes again leaves "
+        "nothing. "
         "The second is weak: a ramp of the whole interval still excites 98 % at a tenth of a period.",
     )
 

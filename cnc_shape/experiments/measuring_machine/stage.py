@@ -70,7 +70,10 @@ def stage_table() -> Table:
     return Table(
         "Section 3.1, Figs. 8-10: positioning on a stage with modes at 30 and 100 Hz",
         tuple(rows),
-        f"The paper gives the two frequencies and measured curves without numbers. Ours are of a {DISTANCE:g} mm move "
-        f"at the limits of the machine {MACHINE}, whose modes have damping 0.02 and 0.01: the structure's exact "
-        "response, drives ideal. That shaping shortens positioning, though the command takes longer, is seen.",
+        f"The paper gives the two frequencies and measured curves without numbers. Ours are of a "
+        f"{DISTANCE:g} mm move "
+        f"at the limits of the machine {MACHINE}, whose modes have damping 0.02 and 0.01: the structure's "
+        "exact "
+        "response, drives ideal. That shaping shortens positioning, though the command takes longer, is "
+        "seen.",
     )

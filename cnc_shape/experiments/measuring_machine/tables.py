@@ -68,8 +68,10 @@ def residual_table() -> Table:
                 "factor exp(-ζ ω n) and sums over two impulses, as the paper has them: not what is left"),
         ),
         "Eq (1) has two misprints: the factor exp(-ζωn) must be exp(-ζω t_n), with the time of the last "
-        "impulse; and the sums of C and S run to 2 where the text says n impulses. V is relative to one impulse "
-        "given at the time of the last one; without the factor it is relative to the unshaped vibration at the "
+        "impulse; and the sums of C and S run to 2 where the text says n impulses. V is relative to one "
+        "impulse "
+        "given at the time of the last one; without the factor it is relative to the unshaped vibration at "
+        "the "
         "same instant.",
     )  # fmt: skip
 
@@ -121,7 +123,8 @@ def model_error_table() -> Table:
     return Table(
         "Section 2.1, Fig. 3: a model that is exact, and one that is 30 % off",
         tuple(rows),
-        "The paper does not say which way the 30 % go, nor of which frequency; so all four readings stand here. "
+        "The paper does not say which way the 30 % go, nor of which frequency; so all four readings stand "
+        "here. "
         'That ZVDD "mostly removes" the vibration fits the last one best, where it leaves 4.5 %. In all of '
         "them more impulses leave less, which is what the figure is for.",
     )

@@ -2,51 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Final
 
-from cnc_shape.experiments.experiment import Drawing, Experiment, Table
+from cnc_shape.experiments.experiment import Experiment
+from cnc_shape.experiments.multi_mode import figures, response_figures
+from cnc_shape.experiments.multi_mode.tables import tables
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-STEMS = (
-    "fig01_duration",
-    "fig02_sequence",
-    "fig03_dimensionless_duration",
-    "fig04_shapers_and_commands",
-    "fig05_amplitudes_over_frequency",
-    "fig06_amplitudes_over_duration",
-    "fig07_step_responses",
-    "fig08_sensitivity",
-    "fig09_bands",
-    "fig10_band_width",
-    "appendix_two_modes",
-    "beyond_stage_contour",
-)
-
-
-def _tables() -> Sequence[Table]:
-    from cnc_shape.experiments.multi_mode.tables import tables
-
-    return tables()
-
-
-def _drawing(stem: str) -> Drawing:
-    def draw() -> Figure:
-        from cnc_shape.experiments.multi_mode.drawings import DRAWINGS
-
-        return DRAWINGS[stem]()
-
-    return draw
-
-
-_FIGURES: Mapping[str, Drawing] = {stem: _drawing(stem) for stem in STEMS}
-
-EXPERIMENT = Experiment(
+EXPERIMENT: Final = Experiment(
     id="001",
-    title="A Method of Input Shaper Design Using Virtual Mode for Undamped Vibration Systems",
-    reference="S. W. Hong, H. S. Choi, Y. G. Seo, S. W. Park, 2008 (in Korean)",
-    tables=_tables,
-    figures=_FIGURES,
+    title="Virtual-mode shapers, and few impulses for many modes",
+    reference=(
+        "S. W. Hong, H. S. Choi, Y. G. Seo, S. W. Park, A Method of Input Shaper Design Using Virtual Mode for "
+        "Undamped Vibration Systems (in Korean), 2008."
+    ),
+    tables=tables,
+    figures={
+        "fig01_duration": figures.shaper_duration,
+        "fig02_sequence": figures.impulse_sequence,
+        "fig03_dimensionless_duration": figures.dimensionless_duration,
+        "fig04_shapers_and_commands": figures.shapers_and_commands,
+        "fig05_amplitudes_over_frequency": figures.amplitudes_over_frequency,
+        "fig06_amplitudes_over_duration": figures.amplitudes_over_duration,
+        "fig07_step_responses": response_figures.step_responses,
+        "fig08_sensitivity": response_figures.sensitivity_surface,
+        "fig09_bands": response_figures.sensitivity_bands,
+        "fig10_band_width": response_figures.band_width,
+        "appendix_two_modes": figures.two_mode_shapers,
+        "beyond_stage_contour": figures.stage_contour,
+    },
 )

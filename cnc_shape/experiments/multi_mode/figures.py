@@ -11,7 +11,7 @@ from cnc_shape.experiments.multi_mode.designs import REAL, with_virtual
 from cnc_shape.experiments.multi_mode.stage import stage_run
 from cnc_shape.report.figures import path_figure
 from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, look, new_figure, styled
-from cnc_shape.shapers import Shaper, cascade, umzv, zv
+from cnc_shape.shapers import Shaper, cascade, multi_mode, umzv, zv
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,15 @@ def shaper_duration() -> Figure:
     axes.plot(frequency, 0.5 + 0.5 / frequency, **look(2), label="a ZV for each mode")
     axes.plot(frequency, 2.0 / (frequency + 1.0), **look(0), label="2/(f2 + f1)")
     found = [designs.two_modes(ratio).duration for ratio in SEARCHED]
-    axes.plot(SEARCHED, found, "o", color=COLOURS[0], markersize=4.5, label="shortest found by search")
+    axes.plot(
+        SEARCHED,
+        found,
+        "o",
+        color=COLOURS[0],
+        markersize=4.5,
+        clip_on=False,
+        label="shortest found by search",
+    )
     axes.axhline(zv(REAL).duration, **look(1), label="ZV of mode 1 alone")
     axes.set(xlim=(1.0, 10.0), ylim=(0.0, 2.0), xlabel="frequency of mode 2 (Hz)", ylabel="duration (s)")
     axes.set_title("Fig. 1: duration for two modes, the first at 1 Hz")
@@ -83,7 +91,7 @@ def shapers_and_commands() -> Figure:
         shaper = with_virtual(ratio)
         left, right = panels[2 * row : 2 * row + 2]
         _draw_impulses(left, shaper)
-        left.set_title(f"{title}, impulses" if row else f"Fig. 4{title}, impulses")
+        left.set_title(f"{title}, impulses" if row else f"Fig. 4: {title}, impulses")
         times = np.concatenate([[-0.1], shaper.times, [0.7]])
         sums = np.concatenate([[0.0], np.cumsum(shaper.amplitudes), [1.0]])
         right.plot(times, sums, drawstyle="steps-post", **look(1))
@@ -141,8 +149,6 @@ def amplitudes_over_duration() -> Figure:
 @styled
 def two_mode_shapers() -> Figure:
     """Appendix: 30 and 100 Hz, by one ZV for each mode and by three impulses."""
-    from cnc_shape.shapers import multi_mode
-
     pair = [designs.SLOW, designs.FAST]
     figure, panels = new_figure(WIDTH, 2.6, 1, 2, sharey=True)
     shown = (("one ZV for each mode", cascade(pair)), ("three impulses for both", multi_mode(pair)))

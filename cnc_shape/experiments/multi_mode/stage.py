@@ -39,9 +39,11 @@ def stage_table() -> Table:
     return Table(
         "Beyond the paper: a stage with modes at 30 and 100 Hz",
         tuple(rows),
-        f"The program {PROGRAM} on the machine {MACHINE}, through planning, shaping, drives and structure. The "
+        f"The program {PROGRAM} on the machine {MACHINE}, through planning, shaping, drives and structure. "
+        "The "
         "modes are damped (0.02 and 0.01), which the search takes as it takes undamped ones. Three impulses "
-        "are shorter than the four of one ZV for each mode, so the shaped motion is done sooner and its corners "
+        "are shorter than the four of one ZV for each mode, so the shaped motion is done sooner and its "
+        "corners "
         "are cut less.",
     )
 

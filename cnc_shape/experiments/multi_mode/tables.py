@@ -50,13 +50,17 @@ def duration_table() -> Table:
                 frequency_ratio(virtual_mode(REAL, duration=zv(REAL).duration)), 0.5,
                 "virtual mode designed for the duration of ZV"),
             Row("f2 = 4 Hz, one ZV for each mode, duration less the sum of both", "s", 0.0,
-                added.duration - zv(REAL).duration - zv(other).duration, EXACT, "convolved: durations add up"),
-            Row("f2 = 4 Hz, one ZV for each mode", "s", None, added.duration, 0.0, "convolved; four impulses"),
+                added.duration - zv(REAL).duration - zv(other).duration, EXACT,
+                "convolved: durations add up"),
+            Row("f2 = 4 Hz, one ZV for each mode", "s", None, added.duration, 0.0,
+                "convolved; four impulses"),
             Row("f2 = 4 Hz, three impulses", "s", None, designs.two_modes(4.0).duration, 0.0,
                 "by search; 36 % shorter than one ZV for each mode"),
         ),
-        "Mode 1 is at 1 Hz, both are undamped. The paper assumes equal spacing, t3 = 2 t2; our search does not, "
-        "and finds nothing shorter. Longer solutions are the other branches 2m/(f2 ± f1) and unequally spaced ones.",
+        "Mode 1 is at 1 Hz, both are undamped. The paper assumes equal spacing, t3 = 2 t2; our search does "
+        "not, "
+        "and finds nothing shorter. Longer solutions are the other branches 2m/(f2 ± f1) and unequally "
+        "spaced ones.",
     )  # fmt: skip
 
 
@@ -132,14 +136,16 @@ def saturation_table() -> Table:
         (
             Row("t* at which the amplitude is 1", "-", 0.333,
                 virtual_mode(REAL, max_amplitude=1.0).duration, 5e-4, "designed for A1 = 1; UMZV"),
-            Row("120 %: f*", "-", 5.6, frequency_ratio(bounded[1.2]), 0.05, f"designed for A1 = 1.2; {rounded}"),
+            Row("120 %: f*", "-", 5.6, frequency_ratio(bounded[1.2]), 0.05,
+                f"designed for A1 = 1.2; {rounded}"),
             Row("120 %: t*", "-", 0.3, bounded[1.2].duration, 0.05, "the same design"),
             Row("150 %: f*", "-", 6.5, frequency_ratio(bounded[1.5]), 0.05,
                 f"designed for A1 = 1.5; {rounded}, here upwards, past the limit: A1 is 1.511 at 6.5"),
             Row("150 %: t*, from the rounded f* = 6.5", "-", 0.2667, with_virtual(6.5).duration, 5e-5,
                 "2/(1 + 6.5): how the paper got its four digits"),
             Row("150 %: t*", "-", 0.2667, bounded[1.5].duration, 5e-5,
-                "designed for A1 = 1.5. The paper's four digits follow from its rounded f* and are 0.4 % too short"),
+                "designed for A1 = 1.5. The paper's four digits follow from its rounded f* and are "
+                "0.4 % too short"),
             Row("150 %: A1 at f* = 6.5", "-", None, float(with_virtual(6.5).amplitudes[0]), 0.0,
                 "above the 1.5 that the paper means to keep"),
             Row("Σ|A| at f* = 5", "-", None, with_virtual(5.0).sum_abs_amplitude, 0.0,
@@ -149,8 +155,10 @@ def saturation_table() -> Table:
             Row("smallest A1, at t* = 1", "-", None, float(with_virtual(1.0).amplitudes[0]), 0.0,
                 "ZVD; longer shapers have larger impulses again, as the paper says"),
         ),
-        "Three things in the paper's text are turned round or left out: amplitudes grow for a *short* duration, "
-        "not for a large one; the limits on t* are lower ones (t* ≥ 0.3, t* ≥ 0.2667), printed as upper ones; and the "
+        "Three things in the paper's text are turned round or left out: amplitudes grow for a *short* "
+        "duration, "
+        "not for a large one; the limits on t* are lower ones (t* ≥ 0.3, t* ≥ 0.2667), printed as upper "
+        "ones; and the "
         "largest |A| bounds what a step asks of the actuator (its running sums are A1, 1 - A1, 1), while a "
         "general command may need Σ|A| times as much.",
     )  # fmt: skip
@@ -182,7 +190,8 @@ def robustness_table() -> Table:
     return Table(
         "Section 3.4, Figs. 8-10: robustness",
         (
-            Row("fv = 3 Hz, width of the 5 % band", "-", 0.064, zero, 5e-4, "ZV; over the modelled frequency"),
+            Row("fv = 3 Hz, width of the 5 % band", "-", 0.064, zero, 5e-4,
+                "ZV; over the modelled frequency"),
             Row("fv = 10 Hz, width of the 5 % band", "-", 0.052, ten, 5e-4,
                 "the paper is 1 % too wide, more than its last digit: 0.052 belongs to fv = 8.3 Hz"),
             Row("fv at which the width is 0.052", "Hz", None, designs.crossing(0.052), 0.0, "by halving"),
@@ -195,7 +204,8 @@ def robustness_table() -> Table:
                 "0.091 s is the second impulse; the shaper ends at the third, twice as late"),
             Row("fv = 10 Hz, second impulse", "s", None, float(quickest.times[1]), 0.0,
                 "here is the 0.091 s that the paper gives for the duration"),
-            Row("duration over that of ZV, 10 Hz", "-", 0.2, quickest.duration / with_virtual(3.0).duration, 0.02,
+            Row("duration over that of ZV, 10 Hz", "-", 0.2,
+                quickest.duration / with_virtual(3.0).duration, 0.02,
                 "the paper says below 1/5, from 0.091 s; it is 4/11"),
             Row("fv = 1000 Hz, width of the 5 % band", "-", None, designs.width(1000.0), 0.0,
                 "the value it converges to, as Fig. 10 shows, is √1.05 - √0.95 = 0.05002"),
@@ -214,12 +224,14 @@ def appendix_table() -> Table:
         (
             Row("unknowns, n = 2", "-", 5.0, float(unknowns), 0.0,
                 "2n + 1: amplitudes and times of the shaper found, the first time being 0"),
-            Row("eq A7, norm of the error", "-", 0.0, designs.equation_error(shaper, pair), EXACT, "by search"),
+            Row("eq A7, norm of the error", "-", 0.0, designs.equation_error(shaper, pair), EXACT,
+                "by search"),
             Row("t2", "ms", None, 1e3 * float(shaper.times[1]), 0.0, "1/(f1 + f2)"),
             Row("t3", "ms", None, 1e3 * shaper.duration, 0.0, "2/(f1 + f2)"),
             Row("A1 = A3", "-", None, float(shaper.amplitudes[0]), 0.0, "eq 8a with fv = 100 Hz"),
             Row("A2", "-", None, float(shaper.amplitudes[1]), 0.0, "eq 8b with fv = 100 Hz"),
-            Row("duration of one ZV for each mode", "ms", None, 1e3 * row.duration, 0.0, "four impulses of 1/4"),
+            Row("duration of one ZV for each mode", "ms", None, 1e3 * row.duration, 0.0,
+                "four impulses of 1/4"),
             Row("three positive impulses", "ms", None, 1e3 * positive.duration, 0.0,
                 "the shortest that does without a negative one is longer than one ZV for each mode"),
         ),
