@@ -37,5 +37,5 @@ def surface_figure(
         axes.locator_params(axis=name, nbins=5)
     axes.set(xlabel=labels[0], ylabel=labels[1], zlabel=labels[2], title=title)
     axes.view_init(elev=view[0], azim=view[1])
-    axes.set_box_aspect(None, zoom=0.92)
+    axes.set_box_aspect(None, zoom=0.88)
     return figure

@@ -5,18 +5,17 @@ from __future__ import annotations
 from typing import Final
 
 from cnc_shape.experiments.experiment import Experiment
-from cnc_shape.experiments.measuring_machine import figures, motion_figures
-from cnc_shape.experiments.measuring_machine.tables import tables
+from cnc_shape.experiments.measuring_machine import figures, motion_figures, tables
 
 EXPERIMENT: Final = Experiment(
     id="000",
     title="Input shaping of a stage and a coordinate measuring machine",
     reference=(
-        "S.-W. Hong, S.-W. Park, W. E. Singhose, Input Shaping for Vibration Reduction in Precise Positioning "
-        "System (in Korean), about 2008. Its curves are measured or computed and have no numbers; Figs. 7 and 11 "
-        "are sketches of the machines."
+        "S.-W. Hong, S.-W. Park, W. E. Singhose, Input Shaping for Vibration Reduction in Precise "
+        "Positioning System (in Korean), about 2008. Its curves, measured and computed, have no numbers; "
+        "Figs. 7 and 11 are sketches of machines."
     ),
-    tables=tables,
+    tables=tables.tables,
     figures={
         "fig01_shaped_step": figures.shaped_step,
         "fig02_step_responses": figures.step_with_and_without,

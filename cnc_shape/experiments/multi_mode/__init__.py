@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Final
 
 from cnc_shape.experiments.experiment import Experiment
-from cnc_shape.experiments.multi_mode import figures, response_figures
-from cnc_shape.experiments.multi_mode.tables import tables
+from cnc_shape.experiments.multi_mode import figures, response_figures, tables
 
 EXPERIMENT: Final = Experiment(
     id="001",
     title="Virtual-mode shapers, and few impulses for many modes",
     reference=(
-        "S. W. Hong, H. S. Choi, Y. G. Seo, S. W. Park, A Method of Input Shaper Design Using Virtual Mode for "
-        "Undamped Vibration Systems (in Korean), 2008."
+        "S. W. Hong, H. S. Choi, Y. G. Seo, S. W. Park, A Method of Input Shaper Design Using Virtual Mode "
+        "for Undamped Vibration Systems (in Korean), 2008."
     ),
-    tables=tables,
+    tables=tables.tables,
     figures={
         "fig01_duration": figures.shaper_duration,
         "fig02_sequence": figures.impulse_sequence,
