@@ -1,0 +1,37 @@
+"""Paper 002: specified-duration shapers, their robustness, and a container that does not swing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from cnc_shape.experiments.experiment import Experiment, Table
+from cnc_shape.experiments.specified_duration import tables
+from cnc_shape.experiments.specified_duration.designs import designs
+from cnc_shape.experiments.specified_duration.sweep import duration_table
+from cnc_shape.experiments.specified_duration.transport import transport_table
+
+
+def _tables() -> Sequence[Table]:
+    found = designs()
+    return (
+        tables.durations(found),
+        *(tables.equation_table(design) for design in found.values()),
+        tables.stepping(found),
+        tables.robustness(found),
+        tables.steps(found),
+        duration_table(),
+        transport_table(found),
+    )
+
+
+EXPERIMENT: Final = Experiment(
+    id="002",
+    title="Specified-duration shapers",
+    reference=(
+        "B. B. Kang, SD shapers that remove residual vibration in an arbitrary shaping time (in Korean), Journal of "
+        "Korea Robotics Society. Of its formulas, numbers included, only the text around them is at hand."
+    ),
+    tables=_tables,
+    figures={},
+)
