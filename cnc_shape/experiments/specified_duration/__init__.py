@@ -29,8 +29,9 @@ EXPERIMENT: Final = Experiment(
     id="002",
     title="Specified-duration shapers",
     reference=(
-        "B. B. Kang, SD shapers that remove residual vibration in an arbitrary shaping time (in Korean), Journal of "
-        "Korea Robotics Society. Of its formulas, numbers included, only the text around them is at hand."
+        "B. B. Kang, SD shapers that remove residual vibration in an arbitrary shaping time (in Korean), "
+        "Journal of Korea Robotics Society, 2023. Its formulas, with the numbers of eqs 14-22, are images: "
+        "what is compared are the numbers and statements of its text; ours of eqs 14-22 stand beside."
     ),
     tables=_tables,
     figures={},

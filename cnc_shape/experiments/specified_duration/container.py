@@ -1,15 +1,15 @@
 """Section 5: a container under a trolley, and a step of 10 cm (Fig. 8).
 
-The trolley is the package's machine with one mode, the command a step of 100 mm that goes through the shaper,
-and the response the package's simulation. The paper's trolley is moved by a servo motor, whose dynamics it names
-as the reason that the swing is gone later than designed, without telling them; so the step is also run through
-a position loop whose gain is such that the unshaped swing is the 96.94 mm that were measured.
+The trolley is the package's machine with one mode, the command a step of 100 mm that goes through the
+shaper, and the response the package's simulation. The paper's trolley is moved by a servo motor, whose
+dynamics it names as the reason that the swing is gone later than designed, without telling them; so the step
+is also run through a position loop whose gain is such that the unshaped swing is the 96.94 mm of the paper.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 from scipy.optimize import brentq  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
@@ -52,7 +52,7 @@ def run(shaper: Shaper, position_gain: float | None = None) -> Run:
     control = Control(sample_time=SAMPLE_TIME, position_gain=position_gain or 20.0)
     command = shape(_step(shaper.duration + SETTLING + WATCHED), {"x": shaper})
     tool = simulate(command, machine, control).tool[:, 0]
-    time = SAMPLE_TIME * np.arange(tool.size)
+    time = SAMPLE_TIME * np.arange(tool.size, dtype=np.float64)
     off = np.abs(tool - STEP)
     left = off[time >= shaper.duration + SETTLING]
     return Run(time, tool, float(left.max()), float(time[np.flatnonzero(off > CALM)[-1]]))
@@ -75,7 +75,7 @@ def motor_gain() -> float:
     def excess(gain: float) -> float:
         return run(NONE, gain).amplitude - MEASURED_UNSHAPED
 
-    return float(brentq(excess, 2.0 * CONTAINER.omega, 20.0 * CONTAINER.omega, xtol=1e-6))
+    return cast("float", brentq(excess, 2.0 * CONTAINER.omega, 20.0 * CONTAINER.omega, xtol=1e-6))
 
 
 def frequency_error(shaper: Shaper, left: float) -> float:
@@ -84,4 +84,4 @@ def frequency_error(shaper: Shaper, left: float) -> float:
     def excess(error: float) -> float:
         return float(vibration(shaper, CONTAINER.omega * (1.0 + error), CONTAINER.damping_ratio)) - left
 
-    return float(brentq(excess, 0.0, 0.05))
+    return cast("float", brentq(excess, 0.0, 0.05))

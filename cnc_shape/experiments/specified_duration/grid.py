@@ -1,7 +1,7 @@
 """The paper's own search: one amplitude in steps of 0.01, the rest from the conditions, the most robust wins.
 
-Equations 5, 9 and 11 have one freedom left. The text steps A_1 by 0.01 for them, but A_2 for the closed form of
-eq 6, and once speaks of "a given A_3"; so the amplitude that is stepped is an argument here.
+Equations 5, 9 and 11 have one freedom left. The text steps A_1 by 0.01 for them, but A_2 for the closed form
+of eq 6, and once speaks of "a given A_3"; so the amplitude that is stepped is an argument here.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def search(equation: Equation, impulse: int = 0) -> Found:
     assert equation.periods is not None
     vectors, mode = family(equation.periods), equation.mode
     top = LARGEST_AMPLITUDE if equation.largest < np.inf else 1.0 - STEP
-    levels = STEP * np.arange(1, round(top / STEP) + 1)
+    levels = STEP * np.arange(1, round(top / STEP) + 1, dtype=np.float64)
     shares = _shares_at(vectors, mode, impulse, levels)
     times, amplitudes = impulses(vectors, mode, shares)
     kept = (np.abs(amplitudes).max(axis=1) <= equation.largest * (1.0 + KEPT)) & (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -53,7 +54,7 @@ def duration_table() -> Table:
     """What a longer shaper gains, and where it loses."""
     found = sweep()
     halves = [float(found.width[found.at(value)]) for value in HALVES]
-    rising = sum(a < b for a, b in zip(halves, halves[1:], strict=False))
+    rising = sum(a < b for a, b in pairwise(halves))
     longer = found.periods[1:] > 0.5 + 1e-9
     width = np.diff(found.width)[longer]
     margin = np.diff(found.margin)[longer]
@@ -71,12 +72,15 @@ def duration_table() -> Table:
         Row(
             "section 4: steps of 0.02 periods with no less I_0.05", "%", 100.0,
             100.0 * float((width >= -1e-9).mean()), 0.5,
-            "the longer, the more robust, the paper says of Fig. 5, and it is not so between half and two periods: "
-            "I_0.05 jumps up where the hump of V beside the mode dips under 0.05, on one side only, and falls back",
+            "the longer, the more robust, the paper says of Fig. 5; in steps this small it is not so "
+            "between half and two periods: I_0.05 jumps up where the hump of V beside the mode dips under "
+            "0.05, on one side only, and falls back",
         ),
         Row(
-            "steps of 0.02 periods with no less margin", "%", None, 100.0 * float((margin >= -1e-9).mean()), 0.05,
-            "margin: distance of the nearer end of the band from the mode, which counts where the error has no sign",
+            "steps of 0.02 periods with no less margin", "%", None,
+            100.0 * float((margin >= -1e-9).mean()), 0.05,
+            "margin: distance of the nearer end of the band from the mode, which counts where nobody knows "
+            "on which side the model errs",
         ),
         Row("largest fall of I_0.05 in a step", "-", None, -float(np.diff(found.width)[worst]), DIGITS,
             f"from {fall[0]:.2f} to {fall[1]:.2f} periods"),

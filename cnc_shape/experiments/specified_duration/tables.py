@@ -1,8 +1,9 @@
-"""Paper 002, sections 2-4: durations, the shapers of eqs 14-19, their robustness (Fig. 5) and steps (Fig. 6)."""
+"""Paper 002, sections 2-4: durations, shapers (eqs 14-22), their robustness (Fig. 5) and steps (Fig. 6)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -109,10 +110,11 @@ def stepping(found: Mapping[int, Design]) -> Table:
         *_impulses("eq 14, A_2 stepped", second.shaper, "one of two mirrored shapers; " + LOST),
     ]
     text = (
-        "The paper is not of one mind about its search: below eq 5 it steps A_1, below eq 6 A_2, and once speaks "
-        "of a given A_3. At 0.8 periods A_2 only exists from 0.4472 to 0.5, so that steps of 0.01 leave five values "
-        "of it and miss the best shaper; stepping A_1 hardly does. For damped modes the paper calls for a numerical "
-        "solution; in the impulse vectors of eq 1 three impulses have a closed form for every damping."
+        "The paper is not of one mind about its search: below eq 5 it steps A_1, below eq 6 A_2, and once "
+        "speaks of a given A_3. At 0.8 periods A_2 only exists from 0.4472 to 0.5, so that steps of 0.01 "
+        "leave five values of it and miss the best shaper; stepping A_1 hardly does. For damped modes the "
+        "paper calls for a numerical solution; in the impulse vectors of eq 1 three impulses have a closed "
+        "form for every damping."
     )
     return Table("Which amplitude is stepped (eqs 5, 6)", tuple(rows), text)
 
@@ -120,7 +122,7 @@ def stepping(found: Mapping[int, Design]) -> Table:
 def robustness(found: Mapping[int, Design]) -> Table:
     """Figure 5: how far the frequency may be off."""
     widths = {number: _width(found[number]) for number in (*FIGURE_5, 19)}
-    ordered = sum(widths[a] < widths[b] for a, b in zip(FIGURE_5, FIGURE_5[1:], strict=False))
+    ordered = sum(widths[a] < widths[b] for a, b in pairwise(FIGURE_5))
     rows = [
         Row(
             f"Fig. 5, I_0.05 of {found[n].equation.name}", "-", None, width, DIGITS, "V of eq 7, eq " + str(n)
@@ -134,8 +136,8 @@ def robustness(found: Mapping[int, Design]) -> Table:
         )
     )  # fmt: skip
     text = (
-        "V of eq 7 has the factor e^(-ζωt_N): the vibration left over that of one impulse at the end. It also favours "
-        "longer shapers where the mode is damped. The axis is the actual over the modelled frequency."
+        "V of eq 7 has the factor e^(-ζωt_N): the vibration left over that of one impulse at the end. That "
+        "favours longer shapers where the mode is damped. The axis is the actual over the modelled frequency."
     )
     return Table("Robustness (Fig. 5)", tuple(rows), text)
 

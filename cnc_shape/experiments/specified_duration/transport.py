@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Final
 
 from cnc_shape.experiments.experiment import Row, Table
@@ -26,18 +27,18 @@ def transport_table(found: Mapping[int, Design]) -> Table:
     rows = [
         Row(
             "Fig. 8, unshaped, swing", "mm", MEASURED_UNSHAPED, run(NONE).amplitude, HUNDREDTH,
-            "simulated without a motor: the whole step becomes swing. The measured trolley does not step, its motor "
-            "follows late, and the paper has no model of it",
+            "simulated without a motor: the whole step becomes swing. The measured trolley does not step, "
+            "its motor follows late, and the paper has no model of it",
         ),
         Row(
             "Fig. 8, position gain that explains the unshaped swing", "1/s", None, gain, HUNDREDTH,
-            "of a position loop with a drive of 10 ms; fitted to the 96.94 mm, so that these are no test of it",
+            "of a position loop with a drive of 10 ms, fitted to the 96.94 mm: they are no test of it",
         ),
     ]  # fmt: skip
     for number, measured in MEASURED.items():
         rows += _shaped(found[number], measured, gain)
     durations = [found[number].shaper.duration for number in (20, 22, 21)]
-    ordered = sum(a < b for a, b in zip(durations, durations[1:], strict=False))
+    ordered = sum(a < b for a, b in pairwise(durations))
     rows.append(
         Row(
             "Fig. 8, durations in the order SD 0.35 < ZV < SD 0.8", "-", 2.0, ordered, 0.0,
@@ -45,10 +46,10 @@ def transport_table(found: Mapping[int, Design]) -> Table:
         )
     )  # fmt: skip
     text = (
-        "A pendulum of 3.67 rad/s and damping 0.0015 under a trolley that steps by 100 mm. The paper tells neither the "
-        "motor nor A_max. On a perfect model every shaper removes all of the swing; what was measured, about 1 mm, needs "
-        "a frequency that is off by 0.6 to 1.5 %, and by another amount for each shaper: so part of it is something "
-        "else, such as the motor and the sensor."
+        "A pendulum of 3.67 rad/s and damping 0.0015 under a trolley that steps by 100 mm. The paper tells "
+        "neither the motor nor A_max. On a perfect model every shaper removes all of the swing; what was "
+        "measured, about 1 mm, needs a frequency that is off by 0.6 to 1.5 %, and by another amount for each "
+        "shaper: so part of it is something else, such as the motor and the sensor."
     )
     return Table("Container transport (Fig. 8)", tuple(rows), text)
 
@@ -71,8 +72,8 @@ def _shaped(design: Design, measured: float, gain: float) -> list[Row]:
             100.0 * frequency_error(shaper, share), HUNDREDTH, "actual frequency above the model; V of eq 7",
         ),
         Row(
-            f"Fig. 8, {name}, swing removed, from the measured amplitudes", "%", REMOVED, 100.0 * (1.0 - share), 0.5,
-            "arithmetic of the paper's own numbers",
+            f"Fig. 8, {name}, swing removed, from the measured amplitudes", "%", REMOVED,
+            100.0 * (1.0 - share), 0.5, "arithmetic of the paper's own numbers",
         ),
         Row(
             f"Fig. 8, {name}, within 0.1 mm from", "s", None, ideal.calm_at, HUNDREDTH,
