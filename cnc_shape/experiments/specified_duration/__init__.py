@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from cnc_shape.experiments.experiment import Experiment, Table
-from cnc_shape.experiments.specified_duration import tables
+from cnc_shape.experiments.specified_duration import figures, tables
 from cnc_shape.experiments.specified_duration.designs import designs
 from cnc_shape.experiments.specified_duration.sweep import duration_table
 from cnc_shape.experiments.specified_duration.transport import transport_table
@@ -34,5 +34,12 @@ EXPERIMENT: Final = Experiment(
         "what is compared are the numbers and statements of its text; ours of eqs 14-22 stand beside."
     ),
     tables=_tables,
-    figures={},
+    figures={
+        "impulse-vectors": figures.vector_figure,
+        "sensitivity": figures.sensitivity_figure,
+        "steps": figures.step_figure,
+        "container": figures.transport_figure,
+        "duration": figures.duration_figure,
+        "impulses": figures.impulse_figure,
+    },
 )
