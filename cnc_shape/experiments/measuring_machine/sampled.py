@@ -61,7 +61,8 @@ def interval_table() -> Table:
                             0.0, "V of the taps, interval varied by ±10 %"))  # fmt: skip
         worst = max(left(one, Interpolation.EXACT) for one in (0.93 * interval, interval, 1.07 * interval))
         rows.append(Row(f"{at}, exact: at worst", "%", None, 100.0 * worst, 0.0,
-                        "amplitudes solved again on the grid, at 0.93, 1 and 1.07 of the interval: rounding is left"))  # fmt: skip
+                        "amplitudes solved again on the grid, at 0.93, 1 and 1.07 of the interval: "
+                        "rounding is left"))  # fmt: skip
         rows.append(Row(f"{at}, ramp as long as the interval", "%", None, 100.0 * ramp_left(interval), 0.0,
                         "excitation over that of a sudden change: sinc(f τ)"))  # fmt: skip
     rows += [
