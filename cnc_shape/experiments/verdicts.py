@@ -69,9 +69,9 @@ def published_text(row: Row) -> str:
 
 
 def ours_text(row: Row) -> str:
-    """Our number, to one digit more than the paper prints; a zero up to rounding without any."""
-    if row.published == 0.0 and row.tolerance <= ROUNDING and row.status is Status.REPRODUCED:
-        return f"≤ {row.tolerance:.1g}"
+    """Our number, to one digit more than the paper prints; rounding errors are not shown."""
+    if row.status is Status.REPRODUCED and row.tolerance <= ROUNDING:
+        return f"{row.ours:.6g}" if row.published else f"≤ {row.tolerance:.1g}" if row.tolerance else "0"
     if row.tolerance <= 0.0:
         return f"{row.ours:.6g}"
     decimals = max(0, ceil(-log10(2.0 * row.tolerance) - 1e-9))

@@ -7,7 +7,7 @@ from typing import Final
 
 from cnc_shape.experiments.experiment import Experiment, Table
 from cnc_shape.experiments.specified_duration import figures, tables
-from cnc_shape.experiments.specified_duration.designs import designs
+from cnc_shape.experiments.specified_duration.equations import LOWER, designed, designs
 from cnc_shape.experiments.specified_duration.sweep import duration_table
 from cnc_shape.experiments.specified_duration.transport import transport_table
 
@@ -17,6 +17,7 @@ def _tables() -> Sequence[Table]:
     return (
         tables.durations(found),
         *(tables.equation_table(design) for design in found.values()),
+        tables.equation_table(designed(LOWER)),
         tables.stepping(found),
         tables.robustness(found),
         tables.steps(found),
@@ -30,7 +31,7 @@ EXPERIMENT: Final = Experiment(
     title="Specified-duration shapers",
     reference=(
         "B. B. Kang, SD shapers that remove residual vibration in an arbitrary shaping time (in Korean), "
-        "Journal of Korea Robotics Society, 2023. Its formulas, with the numbers of eqs 14-22, are images: "
+        "Journal of Korea Robotics Society. Its formulas, with the numbers of eqs 14-22, are images: "
         "what is compared are the numbers and statements of its text; ours of eqs 14-22 stand beside."
     ),
     tables=_tables,

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cnc_shape.experiments.experiment import Row, Table
-from cnc_shape.experiments.specified_duration.designs import DAMPED, Design
+from cnc_shape.experiments.specified_duration.equations import DAMPED, Design
 from cnc_shape.experiments.specified_duration.grid import Found, search
 from cnc_shape.shapers import Shaper, zv
 from cnc_shape.shapers.analysis import residual_vibration
@@ -19,7 +19,7 @@ from cnc_shape.shapers.sd_family import impulse_count
 
 EXACT: Final = 1e-9  # what is exact on paper, to rounding
 DIGITS: Final = 5e-6  # half the last digit that is shown of a number that was not published
-LOST: Final = "the formula is an image, its numbers are not in the text"
+LOST: Final = "printed as an image, not in the text at hand"
 AT_REST: Final = 1e-9  # of a unit step
 AFTER: Final = 5.0  # s, how long a step is watched
 

@@ -13,7 +13,7 @@ from cnc_shape.experiments.specified_duration.container import (
     motor_gain,
     run,
 )
-from cnc_shape.experiments.specified_duration.designs import Design
+from cnc_shape.experiments.specified_duration.equations import Design
 from cnc_shape.shapers import NONE
 
 MEASURED: Final = {20: 1.32, 21: 1.12, 22: 0.86}  # mm, swing that is left, section 5
