@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, log10
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from cnc_shape.experiments.experiment import Experiment, Row, Status, Table
@@ -84,8 +85,8 @@ def tolerance_text(row: Row) -> str:
     return "" if row.published is None else f"{row.tolerance:g}"
 
 
-def verdicts_table(table: Table, width: int) -> RichTable:
-    """Lay a table out for a terminal of `width` columns; the quantity is folded where it must be."""
+def verdicts_table(table: Table) -> RichTable:
+    """Lay a table out for a terminal; where that is narrow, quantities are folded, numbers never."""
     from rich import box
     from rich.table import Table as RichTable
     from rich.text import Text
@@ -94,7 +95,7 @@ def verdicts_table(table: Table, width: int) -> RichTable:
         title=Text(one_line(table.title)), box=box.SIMPLE_HEAD, title_justify="left", title_style="bold",
         header_style="bold", padding=(0, 1, 0, 0), pad_edge=False, show_edge=False,
     )  # fmt: skip
-    laid.add_column("quantity", overflow="fold", max_width=max(20, width - 60))
+    laid.add_column("quantity", overflow="fold")
     laid.add_column("unit", no_wrap=True)
     for name in ("published", "ours", "±"):
         laid.add_column(name, justify="right", no_wrap=True)
@@ -111,9 +112,10 @@ def verdicts_table(table: Table, width: int) -> RichTable:
     return laid
 
 
-def reasons(table: Table) -> tuple[str, ...]:
-    """Why rows differ, one sentence each."""
-    return tuple(f"{row.quantity}: {row.note}" for row in table.rows if row.status is Status.DIFFERS)
+def reasons(table: Table, width: int) -> str:
+    """Why rows differ, a paragraph each, for a terminal of `width` columns."""
+    told = [one_line(f"{row.quantity}: {row.note}") for row in table.rows if row.status is Status.DIFFERS]
+    return "\n".join(fill(text, width, initial_indent="  ", subsequent_indent="    ") for text in told)
 
 
 def summary_words(result: Result) -> str:
