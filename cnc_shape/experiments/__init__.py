@@ -14,6 +14,8 @@ from cnc_shape.errors import OptionError
 from cnc_shape.experiments.experiment import Experiment
 
 PAPERS: Final[Mapping[str, str]] = {
+    "000": "cnc_shape.experiments.measuring_machine",
+    "001": "cnc_shape.experiments.multi_mode",
     "002": "cnc_shape.experiments.specified_duration",
 }
 
