@@ -43,18 +43,17 @@ def compute(experiment: Experiment, advance: Callable[[float], None]) -> Result:
 
 
 def results_json(results: Sequence[Result]) -> dict[str, Any]:
-    """Every row, as the JSON that others rely on."""
-    return {
-        "papers": [
-            {"id": result.experiment.id, "rows": [_row_json(row) for row in result.rows]}
-            for result in results
-        ]
-    }
+    """Every row, as the JSON that others rely on; a quantity has its table's title, its place, in front."""
+    return {"papers": [{"id": result.experiment.id, "rows": _rows_json(result)} for result in results]}
 
 
-def _row_json(row: Row) -> dict[str, Any]:
+def _rows_json(result: Result) -> list[dict[str, Any]]:
+    return [_row_json(row, table.title) for table in result.tables for row in table.rows]
+
+
+def _row_json(row: Row, place: str) -> dict[str, Any]:
     return {
-        "quantity": row.quantity,
+        "quantity": f"{place}: {row.quantity}",
         "unit": row.unit,
         "published": row.published,
         "ours": float(row.ours),

@@ -36,11 +36,11 @@ EXPERIMENT: Final = Experiment(
     ),
     tables=_tables,
     figures={
-        "impulse-vectors": figures.vector_figure,
-        "sensitivity": figures.sensitivity_figure,
-        "steps": figures.step_figure,
-        "container": figures.transport_figure,
-        "duration": figures.duration_figure,
-        "impulses": figures.impulse_figure,
+        "fig03_fig04_impulse_vectors": figures.vector_figure,
+        "fig05_sensitivity": figures.sensitivity_figure,
+        "fig06_steps": figures.step_figure,
+        "fig08_container": figures.transport_figure,
+        "beyond_duration": figures.duration_figure,
+        "beyond_impulses": figures.impulse_figure,
     },
 )

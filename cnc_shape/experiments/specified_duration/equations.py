@@ -33,9 +33,9 @@ class Equation:
     variant: str = ""  # how it departs from the paper's
 
     @property
-    def label(self) -> str:
-        """``eq 15``."""
-        return f"eq {self.number}{self.variant}"
+    def place(self) -> str:
+        """``Section 4, eq (15)``."""
+        return f"Section {5 if self.mode is CONTAINER else 4}, eq ({self.number}){self.variant}"
 
 
 def _specified(

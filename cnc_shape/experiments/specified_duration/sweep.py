@@ -67,13 +67,14 @@ def duration_table() -> Table:
     ]
     rows += [
         Row(
-            "abstract: steps of half a period with more robustness", "-", 3.0, rising, 0.0,
-            "I_0.05 at 0.5, 1, 1.5 and 2 periods, where the shapers are ZV and its derivatives",
+            "steps of half a period with more robustness", "-", 3.0, rising, 0.0,
+            "said in the abstract: I_0.05 at 0.5, 1, 1.5 and 2 periods, where the shapers are ZV and its "
+            "derivatives",
         ),
         Row(
-            "section 4: steps of 0.05 periods with no less I_0.05", "%", 100.0,
+            "steps of 0.05 periods with no less I_0.05", "%", 100.0,
             100.0 * float((width >= -1e-9).mean()), 0.5,
-            "the longer, the more robust, the paper says of Fig. 5; in steps this small it is not so "
+            "the longer, the more robust, section 4 says of Fig. 5; in steps this small it is not so "
             "between half and two periods: I_0.05 jumps up where the hump of V beside the mode dips under "
             "0.05, on one side only, and falls back",
         ),
@@ -86,4 +87,4 @@ def duration_table() -> Table:
         Row("largest fall of I_0.05 in a step", "-", None, -float(width[worst]), DIGITS,
             f"from {fall[0]:.2f} to {fall[1]:.2f} periods"),
     ]  # fmt: skip
-    return Table("Robustness over the duration (abstract, section 4)", tuple(rows))
+    return Table("Abstract and section 4: robustness over the duration", tuple(rows))
