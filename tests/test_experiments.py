@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from math import isfinite
@@ -14,7 +15,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from cnc_shape.experiments import measuring_machine, multi_mode
-from cnc_shape.experiments.experiment import Experiment, Row, Status
+from cnc_shape.experiments.experiment import Row, Status, Table
 from cnc_shape.experiments.measuring_machine import probing, sampled
 from cnc_shape.experiments.multi_mode import designs
 from cnc_shape.experiments.straight_motion import joined, move, settled
@@ -67,13 +68,18 @@ SETTLING = {"unshaped": 1182.0, "ZV": 17.1, "SD, 0.8 periods": 28.1, "ZVD": 35.8
 
 
 @cache
+def tables_of(paper: str) -> Sequence[Table]:
+    return EXPERIMENTS[paper].tables()
+
+
+@cache
 def rows_of(paper: str) -> dict[str, Row]:
-    return rows_now(EXPERIMENTS[paper])
+    return rows_in(tables_of(paper))
 
 
-def rows_now(experiment: Experiment) -> dict[str, Row]:
+def rows_in(tables: Sequence[Table]) -> dict[str, Row]:
     found: dict[str, Row] = {}
-    for table in experiment.tables():
+    for table in tables:
         for row in table.rows:
             found.setdefault(row.quantity, row)  # the probing cycle comes twice: as a model, as a program
     return found
@@ -81,7 +87,7 @@ def rows_now(experiment: Experiment) -> dict[str, Row]:
 
 @pytest.mark.parametrize("paper", EXPERIMENTS)
 def test_every_row_tells_how_it_was_computed(paper):
-    for table in EXPERIMENTS[paper].tables():
+    for table in tables_of(paper):
         names = [row.quantity for row in table.rows]
         assert table.title
         assert len(set(names)) == len(names)
@@ -116,10 +122,21 @@ def test_settling_of_the_probe(name, known):
     assert rows_of("000")[f"{name}: probe hangs within 2 µm"].ours == pytest.approx(known, abs=0.2)
 
 
+@pytest.mark.parametrize(
+    ("name", "known"),
+    {"unshaped": 1141.56, "ZV": 36.76, "SD, 0.8 periods": 47.57, "ZVD": 55.29, "EI": 141.62}.items(),
+)
+def test_the_approach_starts_a_pause_after_the_shaped_gross_move(name, known):
+    assert rows_of("000")[f"{name}: approach is steady within 1 µm"].ours == pytest.approx(known, abs=0.05)
+    shaper = probing.shapers()[name]
+    end = (
+        0.6 + 0.06 + 0.52 + (0.06 + 4.0 / 60.0)
+    )  # gross, pause, approach, retract; each waits for the shaper
+    assert probing.whole_cycle(shaper).end == pytest.approx(end + 3.0 * shaper.duration, abs=1e-9)
+
+
 def test_the_cycle_as_a_program_settles_like_the_model():
-    (program,) = (
-        table for table in EXPERIMENTS["000"].tables() if table.title.endswith("the cycle as a program")
-    )
+    (program,) = (table for table in tables_of("000") if table.title.endswith("the cycle as a program"))
     ours = {row.quantity: row.ours for row in program.rows}
     for case, name in (("unshaped", "unshaped"), ("zv", "ZV"), ("zvd", "ZVD")):
         assert ours[f"{case}: probe hangs within 2 µm"] == pytest.approx(SETTLING[name], abs=1.1)  # sampled
@@ -161,7 +178,9 @@ def stretched(design, factor):
 def test_a_wrong_virtual_mode_is_seen(monkeypatch):
     right = {name for name, row in rows_of("001").items() if row.status is Status.DIFFERS}
     monkeypatch.setattr(designs, "virtual_mode", stretched(designs.virtual_mode, 1.01))
-    wrong = {name for name, row in rows_now(EXPERIMENTS["001"]).items() if row.status is Status.DIFFERS}
+    wrong = {
+        name for name, row in rows_in(EXPERIMENTS["001"].tables()).items() if row.status is Status.DIFFERS
+    }
     assert {"eq 1, error of all equations", "f* = 3 is ZV", "residual vibration"} <= wrong - right
 
 
@@ -171,7 +190,9 @@ def test_a_wrong_zv_is_seen(monkeypatch):
     right = {name for name, row in rows_of("000").items() if row.status is Status.DIFFERS}
     monkeypatch.setattr(tables, "zv", stretched(zv, 1.01))
     monkeypatch.setitem(tables.FAMILY, "ZVD", stretched(zvd, 1.01))
-    wrong = {name for name, row in rows_now(EXPERIMENTS["000"]).items() if row.status is Status.DIFFERS}
+    wrong = {
+        name for name, row in rows_in(EXPERIMENTS["000"].tables()).items() if row.status is Status.DIFFERS
+    }
     assert {"eq 1, ZV at its mode", "ZV: residual vibration", "(a) exact model, ZVD"} <= wrong - right
 
 
@@ -251,4 +272,8 @@ def test_a_hand_driven_motion_through_exact_taps_leaves_the_mode_at_rest():
     taps = discretise(zv(mode), 0.093, Interpolation.EXACT, [mode]).shaper
     assert sampled.jog(0.093, speeds).ring(mode) > 0.1
     assert sampled.jog(0.093, speeds, taps).ring(mode) < 1e-12
-    assert sampled.jog(0.1, speeds).position(np.array([1.0]))[0] == pytest.approx(1.0)
+    by_hand = sampled.jog(0.1, speeds)
+    assert by_hand.position(np.array([1.0]))[0] == pytest.approx(1.0)
+    assert_allclose(
+        by_hand.velocity(np.array([0.05, 0.1, 0.15, 0.2])), [2.0, 2.0, 5.0, 5.0]
+    )  # ramp, then hold

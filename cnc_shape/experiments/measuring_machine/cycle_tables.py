@@ -38,7 +38,7 @@ def cycle_table() -> Table:
     shaper = zv(probing.COLUMN)
     measured = (
         "unshaped less ZV. The paper measured 10 ms on a machine it gives no numbers of: sign and mechanism "
-        "agree, the size depends on how still is still enough, as the next rows show"
+        "agree, the size depends on how still is still enough, as the rows below it show"
     )
     for tolerance in LEVELS:
         gain = probing.approach_time(NONE, tolerance) - probing.approach_time(shaper, tolerance)
