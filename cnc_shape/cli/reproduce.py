@@ -66,9 +66,9 @@ def _print(results: Sequence[Result]) -> None:
             f"paper {result.experiment.id}: {result.experiment.title}\n", markup=False, style="bold"
         )
         for table in result.tables:
-            console.print(verdicts_table(table, console.width))
-            for reason in reasons(table):
-                console.print(f"  {reason}", markup=False)
+            console.print(verdicts_table(table))
+            if text := reasons(table, console.width):
+                console.print(text, markup=False, soft_wrap=True)
             console.print()
     for result in results:
         console.print(summary_words(result))

@@ -104,7 +104,7 @@ def page(result: Result, kind: Format = "svg") -> str:
     parts = [
         f"# Paper {number}: {experiment.title}",
         experiment.reference,
-        f"Made by `cnc-shape reproduce {number} -o DIR`. {summary_words(result).capitalize()}.",
+        f"Made by `cnc-shape reproduce {number} -o DIR`; {summary_words(result)}.",
         *(_section(table) for table in result.tables),
     ]
     if experiment.figures:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, log10
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from cnc_shape.experiments.experiment import Experiment, Row, Status, Table
@@ -42,18 +43,17 @@ def compute(experiment: Experiment, advance: Callable[[float], None]) -> Result:
 
 
 def results_json(results: Sequence[Result]) -> dict[str, Any]:
-    """Every row, as the JSON that others rely on."""
-    return {
-        "papers": [
-            {"id": result.experiment.id, "rows": [_row_json(row) for row in result.rows]}
-            for result in results
-        ]
-    }
+    """Every row, as the JSON that others rely on; a quantity has its table's title, its place, in front."""
+    return {"papers": [{"id": result.experiment.id, "rows": _rows_json(result)} for result in results]}
 
 
-def _row_json(row: Row) -> dict[str, Any]:
+def _rows_json(result: Result) -> list[dict[str, Any]]:
+    return [_row_json(row, table.title) for table in result.tables for row in table.rows]
+
+
+def _row_json(row: Row, place: str) -> dict[str, Any]:
     return {
-        "quantity": row.quantity,
+        "quantity": f"{place}: {row.quantity}",
         "unit": row.unit,
         "published": row.published,
         "ours": float(row.ours),
@@ -69,9 +69,9 @@ def published_text(row: Row) -> str:
 
 
 def ours_text(row: Row) -> str:
-    """Our number, to one digit more than the paper prints; a zero up to rounding without any."""
-    if row.published == 0.0 and row.tolerance <= ROUNDING and row.status is Status.REPRODUCED:
-        return f"≤ {row.tolerance:.1g}"
+    """Our number, to one digit more than the paper prints; rounding errors are not shown."""
+    if row.status is Status.REPRODUCED and row.tolerance <= ROUNDING:
+        return f"{row.ours:.6g}" if row.published else f"≤ {row.tolerance:.1g}" if row.tolerance else "0"
     if row.tolerance <= 0.0:
         return f"{row.ours:.6g}"
     decimals = max(0, ceil(-log10(2.0 * row.tolerance) - 1e-9))
@@ -84,8 +84,8 @@ def tolerance_text(row: Row) -> str:
     return "" if row.published is None else f"{row.tolerance:g}"
 
 
-def verdicts_table(table: Table, width: int) -> RichTable:
-    """Lay a table out for a terminal of `width` columns; the quantity is folded where it must be."""
+def verdicts_table(table: Table) -> RichTable:
+    """Lay a table out for a terminal; where that is narrow, quantities are folded, numbers never."""
     from rich import box
     from rich.table import Table as RichTable
     from rich.text import Text
@@ -94,7 +94,7 @@ def verdicts_table(table: Table, width: int) -> RichTable:
         title=Text(one_line(table.title)), box=box.SIMPLE_HEAD, title_justify="left", title_style="bold",
         header_style="bold", padding=(0, 1, 0, 0), pad_edge=False, show_edge=False,
     )  # fmt: skip
-    laid.add_column("quantity", overflow="fold", max_width=max(20, width - 60))
+    laid.add_column("quantity", overflow="fold")
     laid.add_column("unit", no_wrap=True)
     for name in ("published", "ours", "±"):
         laid.add_column(name, justify="right", no_wrap=True)
@@ -111,9 +111,10 @@ def verdicts_table(table: Table, width: int) -> RichTable:
     return laid
 
 
-def reasons(table: Table) -> tuple[str, ...]:
-    """Why rows differ, one sentence each."""
-    return tuple(f"{row.quantity}: {row.note}" for row in table.rows if row.status is Status.DIFFERS)
+def reasons(table: Table, width: int) -> str:
+    """Why rows differ, a paragraph each, for a terminal of `width` columns."""
+    told = [one_line(f"{row.quantity}: {row.note}") for row in table.rows if row.status is Status.DIFFERS]
+    return "\n".join(fill(text, width, initial_indent="  ", subsequent_indent="    ") for text in told)
 
 
 def summary_words(result: Result) -> str:

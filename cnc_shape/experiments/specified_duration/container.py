@@ -16,7 +16,7 @@ from scipy.optimize import brentq  # pyright: ignore[reportUnknownVariableType] 
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers.control import Control
-from cnc_shape.experiments.specified_duration.designs import CONTAINER
+from cnc_shape.experiments.specified_duration.equations import CONTAINER
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine
 from cnc_shape.shapers.analysis import vibration

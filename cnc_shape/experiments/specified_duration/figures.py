@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from cnc_shape.experiments.specified_duration.container import Run, motor_gain, run
-from cnc_shape.experiments.specified_duration.designs import UNDAMPED, Design, designs
+from cnc_shape.experiments.specified_duration.equations import UNDAMPED, Design, designs
 from cnc_shape.experiments.specified_duration.sweep import HALVES, sweep
 from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, look, new_figure, styled
 from cnc_shape.shapers import NONE, zv

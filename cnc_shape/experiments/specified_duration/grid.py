@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.experiments.specified_duration.designs import LARGEST_AMPLITUDE, Equation
+from cnc_shape.experiments.specified_duration.equations import Equation
 from cnc_shape.modes import Mode
 from cnc_shape.shapers.insensitivity import DEFAULT_VIBRATION_TOLERANCE, bands
 from cnc_shape.shapers.sd_family import Family, family
@@ -36,7 +36,7 @@ def search(equation: Equation, impulse: int = 0) -> Found:
     """Step the amplitude of `impulse` (0 is the first) by 0.01; keep the largest I_0.05."""
     assert equation.periods is not None
     vectors, mode = family(equation.periods), equation.mode
-    top = LARGEST_AMPLITUDE if equation.largest < np.inf else 1.0 - STEP
+    top = equation.largest if equation.largest < np.inf else 1.0 - STEP
     levels = STEP * np.arange(1, round(top / STEP) + 1, dtype=np.float64)
     shares = _shares_at(vectors, mode, impulse, levels)
     times, amplitudes = impulses(vectors, mode, shares)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cnc_shape.experiments.experiment import Row, Table
-from cnc_shape.experiments.specified_duration.designs import DAMPED, Design
+from cnc_shape.experiments.specified_duration.equations import DAMPED, Design
 from cnc_shape.experiments.specified_duration.grid import Found, search
 from cnc_shape.shapers import Shaper, zv
 from cnc_shape.shapers.analysis import residual_vibration
@@ -19,7 +19,7 @@ from cnc_shape.shapers.sd_family import impulse_count
 
 EXACT: Final = 1e-9  # what is exact on paper, to rounding
 DIGITS: Final = 5e-6  # half the last digit that is shown of a number that was not published
-LOST: Final = "the formula is an image, its numbers are not in the text"
+LOST: Final = "printed as an image, not in the text at hand"
 AT_REST: Final = 1e-9  # of a unit step
 AFTER: Final = 5.0  # s, how long a step is watched
 
@@ -35,61 +35,58 @@ def durations(found: Mapping[int, Design]) -> Table:
         design = found[number]
         ours = design.shaper.duration / design.mode.damped_period
         note = "last impulse of our shaper over the damped period"
-        return Row(f"eq 3, T_N of {design.equation.name}", "-", published, ours, tolerance, note)
+        return Row(f"T_N of {design.equation.name}", "-", published, ours, tolerance, note)
 
     def known(name: str, published: float, derivatives: int) -> Row:
         ours = zv(DAMPED, derivatives=derivatives).duration / DAMPED.damped_period
-        return Row(f"section 2, T_N of {name}", "-", published, ours, EXACT, "exact for every damping")
+        return Row(f"T_N of {name}", "-", published, ours, EXACT, "exact for every damping")
 
     def count(periods: float, published: int) -> Row:
         note = "how many impulses the family of our design has at this duration"
-        return Row(f"eq 4, impulses for T_N = {periods}", "-", published, impulse_count(periods), 0.0, note)
+        return Row(f"impulses for T_N = {periods}", "-", published, impulse_count(periods), 0.0, note)
 
     rows = (
         periods(14, 0.8, 0.05), periods(15, 0.796, 5e-4), periods(16, 1.293, 5e-4), periods(17, 0.398, 5e-4),
         *(known(name, value, k) for k, (name, value) in enumerate(DERIVATIVES)),
         *(count(value, number) for value, number in IMPULSES),
     )  # fmt: skip
-    return Table("Durations and numbers of impulses (eqs 3, 4)", rows)
+    return Table("Section 2, eqs (3) and (4): durations and numbers of impulses", rows)
 
 
 def equation_table(design: Design) -> Table:
     """A shaper: the paper's search and ours, impulse by impulse."""
     equation, shaper = design.equation, design.shaper
-    label = equation.label
-    rows = list(_impulses(label, shaper, "largest I_0.05 over the whole family; " + LOST))
-    rows.append(_condition(label, design))
+    rows = list(_impulses("", shaper, "largest I_0.05 over the whole family; " + LOST))
+    rows.append(_condition(design))
     width = insensitivity(shaper, [design.mode]).width
     assert width is not None
-    rows.append(
-        Row(f"{label}, I_0.05", "-", None, width, DIGITS, "width of the band with V ≤ 0.05, over ω/ω_model")
-    )
+    rows.append(Row("I_0.05", "-", None, width, DIGITS, "width of the band with V ≤ 0.05, over ω/ω_model"))
     if equation.periods is not None:
         stepped = search(equation)
         note = f"the paper's own search, A_1 in steps of 0.01, {stepped.offered} candidates; {LOST}"
-        rows += _impulses(f"{label} as searched", stepped.shaper, note)
-        rows.append(_grid_loss(label, width, stepped))
-    title = f"{label[:1].upper()}{label[1:]}: {equation.name}"
+        rows += _impulses("as searched, ", stepped.shaper, note)
+        rows.append(_grid_loss(width, stepped))
+    title = f"{equation.place}: {equation.name}"
     return Table(title, tuple(rows), equation.note)
 
 
-def _impulses(label: str, shaper: Shaper, note: str) -> Iterator[Row]:
+def _impulses(prefix: str, shaper: Shaper, note: str) -> Iterator[Row]:
     pairs = zip(shaper.times.tolist(), shaper.amplitudes.tolist(), strict=True)
     for k, (time, amplitude) in enumerate(pairs, start=1):
         if k > 1:
-            yield Row(f"{label}, t_{k}", "s", None, time, DIGITS, note)
-        yield Row(f"{label}, A_{k}", "-", None, amplitude, DIGITS, note)
+            yield Row(f"{prefix}t_{k}", "s", None, time, DIGITS, note)
+        yield Row(f"{prefix}A_{k}", "-", None, amplitude, DIGITS, note)
 
 
-def _condition(label: str, design: Design) -> Row:
+def _condition(design: Design) -> Row:
     left = float(residual_vibration(design.shaper, design.mode))
-    return Row(f"{label}, V at the mode", "-", 0.0, left, EXACT, "demanded by eqs 5, 9 and 11; V of eq 7")
+    return Row("V at the mode", "-", 0.0, left, EXACT, "demanded by eqs 5, 9 and 11; V of eq 7")
 
 
-def _grid_loss(label: str, width: float, stepped: Found) -> Row:
+def _grid_loss(width: float, stepped: Found) -> Row:
     loss = 100.0 * (1.0 - stepped.width / width)
     return Row(
-        f"{label}, I_0.05 lost by the steps of 0.01", "%", None, loss, 5e-4,
+        "I_0.05 lost by the steps of 0.01", "%", None, loss, 5e-4,
         "our continuous optimum against the paper's search",
     )  # fmt: skip
 
@@ -102,12 +99,12 @@ def stepping(found: Mapping[int, Design]) -> Table:
     assert best is not None
     counted = "candidates whose other impulses exist and are positive"
     rows = [
-        Row("eq 14, I_0.05, continuous", "-", None, best, DIGITS, "sd of this package"),
-        Row("eq 14, I_0.05, A_1 stepped", "-", None, first.width, DIGITS, "as the text says below eq 5"),
-        Row("eq 14, I_0.05, A_2 stepped", "-", None, second.width, DIGITS, "as the text says below eq 6"),
-        Row("eq 14, A_1 stepped, candidates", "-", None, first.offered, 0.5, counted),
-        Row("eq 14, A_2 stepped, candidates", "-", None, second.offered, 0.5, counted),
-        *_impulses("eq 14, A_2 stepped", second.shaper, "one of two mirrored shapers; " + LOST),
+        Row("I_0.05, continuous", "-", None, best, DIGITS, "sd of this package"),
+        Row("I_0.05, A_1 stepped", "-", None, first.width, DIGITS, "as the text says below eq 5"),
+        Row("I_0.05, A_2 stepped", "-", None, second.width, DIGITS, "as the text says below eq 6"),
+        Row("A_1 stepped, candidates", "-", None, first.offered, 0.5, counted),
+        Row("A_2 stepped, candidates", "-", None, second.offered, 0.5, counted),
+        *_impulses("A_2 stepped, ", second.shaper, "one of two mirrored shapers; " + LOST),
     ]
     text = (
         "The paper is not of one mind about its search: below eq 5 it steps A_1, below eq 6 A_2, and once "
@@ -116,7 +113,7 @@ def stepping(found: Mapping[int, Design]) -> Table:
         "paper calls for a numerical solution; in the impulse vectors of eq 1 three impulses have a closed "
         "form for every damping."
     )
-    return Table("Which amplitude is stepped (eqs 5, 6)", tuple(rows), text)
+    return Table("Section 2, eqs (5) and (6): which amplitude is stepped", tuple(rows), text)
 
 
 def robustness(found: Mapping[int, Design]) -> Table:
@@ -124,14 +121,12 @@ def robustness(found: Mapping[int, Design]) -> Table:
     widths = {number: _width(found[number]) for number in (*FIGURE_5, 19)}
     ordered = sum(widths[a] < widths[b] for a, b in pairwise(FIGURE_5))
     rows = [
-        Row(
-            f"Fig. 5, I_0.05 of {found[n].equation.name}", "-", None, width, DIGITS, "V of eq 7, eq " + str(n)
-        )
+        Row(f"I_0.05 of {found[n].equation.name}", "-", None, width, DIGITS, "V of eq 7, eq " + str(n))
         for n, width in widths.items()
     ]
     rows.append(
         Row(
-            "Fig. 5, steps in the order SD 0.4 s < ZV < SD 0.8 s < SD 1.3 s", "-", 3.0, ordered, 0.0,
+            "steps in the order SD 0.4 s < ZV < SD 0.8 s < SD 1.3 s", "-", 3.0, ordered, 0.0,
             "said in section 4: how many of the three comparisons of I_0.05 come out so",
         )
     )  # fmt: skip
@@ -139,7 +134,7 @@ def robustness(found: Mapping[int, Design]) -> Table:
         "V of eq 7 has the factor e^(-ζωt_N): the vibration left over that of one impulse at the end. That "
         "favours longer shapers where the mode is damped. The axis is the actual over the modelled frequency."
     )
-    return Table("Robustness (Fig. 5)", tuple(rows), text)
+    return Table("Section 4, Fig. 5: robustness", tuple(rows), text)
 
 
 def _width(design: Design) -> float:
@@ -162,7 +157,7 @@ def steps(found: Mapping[int, Design]) -> Table:
         tolerance = DIGITS * 10.0 if published is None else 0.05
         name = design.equation.name
         rows += [
-            Row(f"Fig. 6, {name}, at rest from", "s", published, rest, tolerance, note),
-            Row(f"Fig. 6, {name}, left after it", "-", 0.0, left, EXACT, "section 4: gone exactly then"),
+            Row(f"{name}, at rest from", "s", published, rest, tolerance, note),
+            Row(f"{name}, left after it", "-", 0.0, left, EXACT, "section 4: gone exactly then"),
         ]
-    return Table("Unit steps (Fig. 6)", tuple(rows))
+    return Table("Section 4, Fig. 6: unit steps", tuple(rows))

@@ -13,7 +13,7 @@ from cnc_shape.experiments.specified_duration.container import (
     motor_gain,
     run,
 )
-from cnc_shape.experiments.specified_duration.designs import Design
+from cnc_shape.experiments.specified_duration.equations import Design
 from cnc_shape.shapers import NONE
 
 MEASURED: Final = {20: 1.32, 21: 1.12, 22: 0.86}  # mm, swing that is left, section 5
@@ -26,12 +26,12 @@ def transport_table(found: Mapping[int, Design]) -> Table:
     gain = motor_gain()
     rows = [
         Row(
-            "Fig. 8, unshaped, swing", "mm", MEASURED_UNSHAPED, run(NONE).amplitude, HUNDREDTH,
+            "unshaped, swing", "mm", MEASURED_UNSHAPED, run(NONE).amplitude, HUNDREDTH,
             "simulated without a motor: the whole step becomes swing. The measured trolley does not step, "
             "its motor follows late, and the paper has no model of it",
         ),
         Row(
-            "Fig. 8, position gain that explains the unshaped swing", "1/s", None, gain, HUNDREDTH,
+            "position gain that explains the unshaped swing", "1/s", None, gain, HUNDREDTH,
             "of a position loop with a drive of 10 ms, fitted to the 96.94 mm: they are no test of it",
         ),
     ]  # fmt: skip
@@ -41,7 +41,7 @@ def transport_table(found: Mapping[int, Design]) -> Table:
     ordered = sum(a < b for a, b in pairwise(durations))
     rows.append(
         Row(
-            "Fig. 8, durations in the order SD 0.35 < ZV < SD 0.8", "-", 2.0, ordered, 0.0,
+            "durations in the order SD 0.35 < ZV < SD 0.8", "-", 2.0, ordered, 0.0,
             "how many of the two comparisons come out so",
         )
     )  # fmt: skip
@@ -51,7 +51,7 @@ def transport_table(found: Mapping[int, Design]) -> Table:
         "measured, about 1 mm, needs a frequency that is off by 0.6 to 1.5 %, and by another amount for each "
         "shaper: so part of it is something else, such as the motor and the sensor."
     )
-    return Table("Container transport (Fig. 8)", tuple(rows), text)
+    return Table("Section 5, Fig. 8: container transport", tuple(rows), text)
 
 
 def _shaped(design: Design, measured: float, gain: float) -> list[Row]:
@@ -60,27 +60,27 @@ def _shaped(design: Design, measured: float, gain: float) -> list[Row]:
     share = measured / MEASURED_UNSHAPED
     return [
         Row(
-            f"Fig. 8, {name}, swing", "mm", measured, ideal.amplitude, HUNDREDTH,
+            f"{name}, swing", "mm", measured, ideal.amplitude, HUNDREDTH,
             "simulated with the modelled frequency, where nothing is left; the apparatus is not its model",
         ),
         Row(
-            f"Fig. 8, {name}, swing with a motor", "mm", None, moved.amplitude, HUNDREDTH,
+            f"{name}, swing with a motor", "mm", None, moved.amplitude, HUNDREDTH,
             "a linear motor delays the step and adds no swing",
         ),
         Row(
-            f"Fig. 8, {name}, frequency error that explains the swing", "%", None,
+            f"{name}, frequency error that explains the swing", "%", None,
             100.0 * frequency_error(shaper, share), HUNDREDTH, "actual frequency above the model; V of eq 7",
         ),
         Row(
-            f"Fig. 8, {name}, swing removed, from the measured amplitudes", "%", REMOVED,
+            f"{name}, swing removed, from the measured amplitudes", "%", REMOVED,
             100.0 * (1.0 - share), 0.5, "arithmetic of the paper's own numbers",
         ),
         Row(
-            f"Fig. 8, {name}, within 0.1 mm from", "s", None, ideal.calm_at, HUNDREDTH,
+            f"{name}, within 0.1 mm from", "s", None, ideal.calm_at, HUNDREDTH,
             f"simulated without a motor; the shaper is {shaper.duration:.3f} s long",
         ),
         Row(
-            f"Fig. 8, {name}, within 0.1 mm with a motor from", "s", None, moved.calm_at, HUNDREDTH,
+            f"{name}, within 0.1 mm with a motor from", "s", None, moved.calm_at, HUNDREDTH,
             "section 5: the motor is why the swing ends later than the shaper",
         ),
     ]  # fmt: skip

@@ -30,36 +30,51 @@ class Equation:
     largest: float = inf  # -, bound on |A_i|
     gap: float = 0.0  # s, bound on the time between impulses
     note: str = ""
+    variant: str = ""  # how it departs from the paper's
 
     @property
-    def label(self) -> str:
-        """``eq 15``."""
-        return f"eq {self.number}"
+    def place(self) -> str:
+        """``Section 4, eq (15)``."""
+        return f"Section {5 if self.mode is CONTAINER else 4}, eq ({self.number}){self.variant}"
 
 
 def _specified(
-    number: int, name: str, mode: Mode, periods: float, *, bounded: bool = False, note: str = ""
+    number: int,
+    name: str,
+    mode: Mode,
+    periods: float,
+    largest: float | None = None,
+    note: str = "",
+    variant: str = "",
 ) -> Equation:
-    largest, gap = (LARGEST_AMPLITUDE, LEAST_GAP) if bounded else (inf, 0.0)
+    gap = 0.0 if largest is None else LEAST_GAP
 
     def design(mode: Mode) -> Shaper:
-        return sd(mode, duration_periods=periods, max_amplitude=largest if bounded else None, min_gap=gap)
+        return sd(mode, duration_periods=periods, max_amplitude=largest, min_gap=gap)
 
-    return Equation(number, name, mode, design, periods, largest, gap, note)
+    bound = inf if largest is None else largest
+    return Equation(number, name, mode, design, periods, bound, gap, note, variant)
 
 
-ASSUMED: Final = "A_max and t_min are not said for the container: those of eq 17. "
+ASSUMED: Final = (
+    "The text has no A_max and no t_min for the container. Those of eq 17 are taken; with A_max = 1 instead "
+    "the "
+    "shaper is another and hardly less robust."
+)
 
 EQUATIONS: Final = (
     _specified(14, "SD 0.8 s, 1 Hz undamped", UNDAMPED, 0.8 / UNDAMPED.damped_period),
     _specified(15, "SD 0.8 s, 1 Hz, ζ 0.1", DAMPED, 0.8 / DAMPED.damped_period),
     _specified(16, "SD 1.3 s, 1 Hz, ζ 0.1", DAMPED, 1.3 / DAMPED.damped_period),
-    _specified(17, "SD 0.4 s, 1 Hz, ζ 0.1", DAMPED, 0.4 / DAMPED.damped_period, bounded=True),
+    _specified(17, "SD 0.4 s, 1 Hz, ζ 0.1", DAMPED, 0.4 / DAMPED.damped_period, LARGEST_AMPLITUDE),
     Equation(18, "ZV, 1 Hz, ζ 0.1", DAMPED, lambda mode: zv(mode)),
     Equation(19, "ZVD, 1 Hz, ζ 0.1", DAMPED, lambda mode: zvd(mode)),
-    _specified(20, "SD 0.35 periods, container", CONTAINER, 0.35, bounded=True, note=ASSUMED),
+    _specified(20, "SD 0.35 periods, container", CONTAINER, 0.35, LARGEST_AMPLITUDE, ASSUMED),
     _specified(21, "SD 0.8 periods, container", CONTAINER, 0.8),
     Equation(22, "ZV, container", CONTAINER, lambda mode: zv(mode)),
+)
+LOWER: Final = _specified(
+    20, "SD 0.35 periods, container", CONTAINER, 0.35, 1.0, "As eq 20, but A_max = 1.", " with A_max 1"
 )
 
 
@@ -78,4 +93,9 @@ class Design:
 
 def designs() -> dict[int, Design]:
     """All nine shapers, by the number of their equation."""
-    return {equation.number: Design(equation, equation.design(equation.mode)) for equation in EQUATIONS}
+    return {equation.number: designed(equation) for equation in EQUATIONS}
+
+
+def designed(equation: Equation) -> Design:
+    """Our shaper for an equation."""
+    return Design(equation, equation.design(equation.mode))
