@@ -35,6 +35,7 @@ SAMPLES = {
     "bracket.nc": "xy_stage.yaml",
     "pocket.nc": "mill_three_axis.yaml",
     "clover.csv": "xy_stage.yaml",
+    "probing.nc": "cmm.yaml",
     "circle_time.csv": "xy_stage.yaml",
 }
 PROGRAMS = [name for name in SAMPLES if name != "circle_time.csv"]
