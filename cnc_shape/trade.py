@@ -16,7 +16,10 @@ from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import Block
 from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, settling_time, window
+from cnc_shape.program import ROTARY
+from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
+from cnc_shape.shapers.shaper import NONE as UNSHAPED
 from cnc_shape.simulation import Response, SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
 
@@ -87,6 +90,7 @@ class TradeRow:
 
     name: str
     cycle_time: float  # s
+    contour_factors: Mapping[str, float]  # axis: kappa, tool error on curves over the unshaped one
     command: Deviation
     drives: Deviation
     results: tuple[ModelResult, ...]  # the nominal one first
@@ -105,6 +109,16 @@ class TradeRow:
     def worst_max(self) -> float:
         """Largest contour error of the tool in any model, mm."""
         return max(result.tool.max for result in self.results)
+
+
+def contour_factors(setup: Setup, shaping: Shaping) -> dict[str, float]:
+    """Kappa of every linear axis that bends: 1 where axes are not shaped, 0 where curves are compensated."""
+    found: dict[str, float] = {}
+    for axis in setup.machine.axes:
+        factor = contour_factor(setup.shapers.get(axis.name, UNSHAPED), axis.modes)
+        if factor is not None and axis.name not in ROTARY:
+            found[axis.name] = {Shaping.AXIS: factor, Shaping.CONTOUR: 0.0}.get(shaping, 1.0)
+    return found
 
 
 class ModelTrial:
@@ -145,7 +159,7 @@ class ModelTrial:
         if block.last:
             self._cycle_time = block.cycle_time + self._longer
 
-    def row(self, name: str) -> TradeRow:
+    def row(self, name: str, factors: Mapping[str, float]) -> TradeRow:
         """What it found; call it after the last block."""
         command, drives, *tools = (deviation(found) for found in self._tallies)
         results = [
@@ -153,7 +167,7 @@ class ModelTrial:
             for model, tool, state in zip(self._models, tools, self._states, strict=True)
             if state is not None
         ]
-        return TradeRow(name, self._cycle_time, command, drives, tuple(results))
+        return TradeRow(name, self._cycle_time, factors, command, drives, tuple(results))
 
     def _begin(self, axes: tuple[str, ...]) -> None:
         period, machine = self._control.sample_time, self._setup.machine.with_axes(axes)
@@ -173,9 +187,9 @@ class Trade:
         kinds = tuple(KINDS) if setup.shapers else ()
         timings = {kind: setup.timing(kind) for kind in kinds}
         self.timings = tuple(dict.fromkeys([PLAIN, *timings.values()]))
+        self._factors = {kind: contour_factors(setup, kind) for kind in kinds}
         self._trials = {
-            KINDS[kind]: ModelTrial(setup, setup.command_shaping(kind), timings[kind], structures)
-            for kind in kinds
+            kind: ModelTrial(setup, setup.command_shaping(kind), timings[kind], structures) for kind in kinds
         }
 
     def advance(self, block: Block) -> None:
@@ -185,4 +199,6 @@ class Trade:
 
     def rows(self) -> tuple[TradeRow, ...]:
         """One row a kind; none where the machine has no shapers. Call it after the last block."""
-        return tuple(trial.row(name) for name, trial in self._trials.items() if trial.begun)
+        return tuple(
+            trial.row(KINDS[kind], self._factors[kind]) for kind, trial in self._trials.items() if trial.begun
+        )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from cnc_shape.pipeline import Run
     from cnc_shape.report.folder import Context
     from cnc_shape.report.style import Format
+    from cnc_shape.trade import TradeRow
 
 SAMPLE = "bracket.nc"
 
@@ -63,6 +65,7 @@ def simulate(
     from cnc_shape.opening import open_motion
     from cnc_shape.pipeline import run
     from cnc_shape.report.table import summary_json
+    from cnc_shape.trade import Trade
 
     gates = [parse_gate(text) for text in fail_on or []]
     kind = _figure_format(figures)
@@ -76,13 +79,17 @@ def simulate(
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
+    trade = Trade(setup) if wanted else None
     with (
-        open_motion(source, setup, options, timings(picked)) as motion,
+        open_motion(source, setup, options, timings(picked), trade.timings if trade else ()) as motion,
         progress("simulating", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)
-        result = run(blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals)
-    page = None
+        observers = [] if trade is None else [trade]
+        result = run(
+            blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals, observers=observers
+        )
+    page, kinds = None, () if trade is None else trade.rows()
     if wanted:
         from cnc_shape.api import report_context
 
@@ -91,13 +98,17 @@ def simulate(
             *(["--all-signals"] if all_signals else []),
         ]  # fmt: skip
         context = report_context([source], setup, command, motion.warnings(by_name=True), kind)
-        page = _report(result, output, context, force=force)
+        page = _report(result, output, context, kinds, force=force)
     warn(motion.warnings(), quiet=quiet)
     if json:
-        extra = {} if page is None else {"report": str(page)}
+        extra: dict[str, Any] = {} if page is None else {"report": str(page)}
+        if kinds:
+            from cnc_shape.report.trade_table import trade_json
+
+            extra["trade"] = trade_json(kinds)
         print_json(None, {**summary_json(result.summary), **extra})
     else:
-        _print_table(result, page)
+        _print_table(result, kinds, page)
     failures = [failure for gate in gates if (failure := gate.failure(result.summary)) is not None]
     for failure in failures:
         print_error(failure)
@@ -127,21 +138,27 @@ def _check_folder(folder: Path, *, force: bool) -> None:
     check_folder(folder, MARKER, force=force)
 
 
-def _report(result: Run, output: str | None, context: Context, *, force: bool) -> Path:
+def _report(
+    result: Run, output: str | None, context: Context, trade: Sequence[TradeRow], *, force: bool
+) -> Path:
     from cnc_shape.report.folder import default_folder, write_report
 
     if output is not None:
-        return write_report(result, Path(output), context, force=force)
+        return write_report(result, Path(output), context, trade, force=force)
     folder = default_folder(result, context)
-    return write_report(result, folder, context, force=True)  # its name is its content's
+    return write_report(result, folder, context, trade, force=True)  # its name is its content's
 
 
-def _print_table(result: Run, page: Path | None) -> None:
+def _print_table(result: Run, trade: Sequence[TradeRow], page: Path | None) -> None:
     from rich.console import Console
 
     from cnc_shape.report.table import build_table
 
     console = Console(highlight=False, soft_wrap=False)
     console.print(build_table(result.summary, console.width))
+    if trade:
+        from cnc_shape.report.trade_table import trade_table
+
+        console.print(trade_table(trade, console.width))
     if page is not None:
         console.print(f"report: {page}", soft_wrap=True, markup=False)

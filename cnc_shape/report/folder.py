@@ -25,7 +25,9 @@ from cnc_shape.report.html import Page, render_html
 from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.style import Format, render
 from cnc_shape.report.table import summary_json, tables_csv
+from cnc_shape.report.trade_table import trade_figure, trade_json
 from cnc_shape.shapers import Shaper
+from cnc_shape.trade import TradeRow
 from cnc_shape.units import DEGREE
 from cnc_shape.writers.archive import Stream, write_archive
 from cnc_shape.writers.publish import make_folder, publish_folder
@@ -59,7 +61,14 @@ def default_folder(run: Run, context: Context) -> Path:
     return Path(RUNS) / f"{stem[:60].strip('-') or 'run'}-{digest}"
 
 
-def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *, force: bool = False) -> Path:
+def write_report(
+    run: Run,
+    folder: Path | str,
+    context: Context = NO_CONTEXT,
+    trade: Sequence[TradeRow] = (),
+    *,
+    force: bool = False,
+) -> Path:
     """Write the run folder, whole or not at all; the same run gives the same bytes.
 
     Parameters
@@ -70,6 +79,8 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
         The folder to make; one under ``cnc-shape-runs`` may be the first there.
     context
         What the run was made from.
+    trade
+        Kinds of shaping side by side, where the machine has shapers.
     force
         Replace an older run folder.
 
@@ -93,12 +104,18 @@ def write_report(run: Run, folder: Path | str, context: Context = NO_CONTEXT, *,
     for signals in run.signals:
         _require_finite(signals)
     drawn = draw(run, context)
+    if trade:
+        drawn["trade"] = trade_figure(trade)
     svg = {name: render(figure, "svg") for name, figure in drawn.items()}
-    page = Page(svg, context.shapers, context.modes, context.warnings, context.program, context.machine)
+    page = Page(
+        svg, context.shapers, context.modes, context.warnings, context.program, context.machine, trade
+    )
     kind = context.figure_format
     content = {
         "report.html": _encoded(render_html(run, page)),
-        "results.json": _json(summary_json(run.summary)),
+        "results.json": _json(
+            {**summary_json(run.summary), **({"trade": trade_json(trade)} if trade else {})}
+        ),
         "tables.csv": _encoded(tables_csv(run.summary)),
         "machine.yaml": _encoded(context.machine),
         MARKER: _run_json(context),

@@ -16,9 +16,11 @@ from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run
 from cnc_shape.report.table import columns, micrometres
 from cnc_shape.report.text import one_line
+from cnc_shape.report.trade_table import HEADINGS, cells, explanation
 from cnc_shape.report.words import Place, best_case, price_of_shaping, verdict, worst_places
 from cnc_shape.shapers import Shaper
 from cnc_shape.shapers.analysis import contour_factor
+from cnc_shape.trade import TradeRow
 
 LONGEST_LINE = 60  # characters of a program line that are shown
 
@@ -27,6 +29,8 @@ CAPTIONS = {
     "error": "Contour error over time, at the tool and at the drives.",
     "vibration": "Deflection of the structure between drive and tool.",
     "motion": "Speed and acceleration of the command.",
+    "trade": "Contour error of the tool by kind of shaping: a dot for the structure as modelled, a bar over "
+    "all models that the machine file allows for.",
     "shapers": "Left: the impulses. Right: the vibration a mode keeps where its real frequency is off.",
 }
 FROM_SIGNALS = ("path", "error", "vibration", "motion")  # figures that are drawn from the signals
@@ -42,6 +46,7 @@ class Page:
     warnings: Sequence[str] = ()  # of the reader and the machine file
     program: Path | None = None  # where the program's text lies
     machine: str = ""  # the machine file
+    trade: Sequence[TradeRow] = ()  # kinds of shaping side by side
 
 
 NO_PAGE = Page()
@@ -96,7 +101,11 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
             }
             for k, case in enumerate(summary.cases)
         ],
-        figures=[picture for name, picture in pictures.items() if name != "shapers"],
+        figures=[picture for name, picture in pictures.items() if name not in ("shapers", "trade")],
+        trade_headings=HEADINGS,
+        trade_rows=[(row.name, cells(row)) for row in page.trade],
+        trade_note=explanation(page.trade) if page.trade else "",
+        trade_figure=pictures.get("trade"),
         shapers=[_shaper_row(axis, shaper, page.modes[axis]) for axis, shaper in page.shapers.items()],
         shaper_figure=pictures.get("shapers"),
         first=one_line(first.name),

@@ -64,8 +64,8 @@ def case_json(case: CaseSummary) -> dict[str, Any]:
         "contour_max_line": case.drives.line,
         "tool_contour_rms_um": _um(case.tool.rms),
         "tool_contour_max_um": _um(case.tool.max),
-        **_by_unit("following_rms", case.following_rms),
-        **_by_unit("residual_vibration", case.residual_vibration),
+        **by_unit("following_rms", case.following_rms),
+        **by_unit("residual_vibration", case.residual_vibration),
     }
 
 
@@ -73,7 +73,8 @@ def _um(value: float) -> float:
     return value / MICROMETRE
 
 
-def _by_unit(name: str, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+def by_unit(name: str, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """A number of each axis under the key of its unit: micrometres, thousandths of a degree."""
     parts = {f"{name}_um": {axis: _um(value) for axis, value in values.items() if axis not in ROTARY}}
     turning = {axis: value / MILLIDEGREE for axis, value in values.items() if axis in ROTARY}
     return {**parts, f"{name}_mdeg": turning} if turning else parts
