@@ -59,10 +59,12 @@ def open_motion(
     setup: Setup,
     options: ReadingOptions | None = None,
     timings: Sequence[Timing] = (PLAIN,),
+    watched: Sequence[Timing] = (),
 ) -> Generator[OpenMotion]:
     """Open a file and plan it as it is read, once for each timing; where it tells the time itself, replay it.
 
-    Tool lengths are the machine's where `options` have none.
+    Tool lengths are the machine's where `options` have none. A time trajectory cannot be path-shaped: that is
+    refused in `timings`, and left out of the `watched` ones.
 
     Raises
     ------
@@ -83,8 +85,9 @@ def open_motion(
             command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
             blocks = replaying(command, toolpath)
         else:
+            every = tuple(dict.fromkeys((*timings, *watched)))
             chunks = _noted(opened.chunks, motion.notes)
-            blocks = moving(chunks, setup.machine, setup.planning.path_tolerance, period, timings)
+            blocks = moving(chunks, setup.machine, setup.planning.path_tolerance, period, every)
         motion.blocks = _watched(blocks, motion)
         yield motion
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
+from typing import Protocol
 
 import numpy as np
 
@@ -73,6 +74,12 @@ def window(settling: float, longest: float, sample_time: float) -> tuple[int, in
     return ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1
 
 
+def settling_time(machine: Machine, control: Control) -> float:
+    """Time constant of the position loop, s; 0 where all drives are ideal."""
+    lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
+    return min(1.0 / control.position_gain, SLOWEST_LOOP) if lags else 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
     """The scalars of one case: one row of the table."""
@@ -111,6 +118,14 @@ class Run:
         return next(signals for signals in self.signals if signals.case == case)
 
 
+class Observer(Protocol):
+    """What is fed every block of a motion."""
+
+    def advance(self, block: Block) -> None:
+        """Take the next block."""
+        ...
+
+
 class Trial:
     """One case under way: its stages, where they stand, and what they have seen so far."""
 
@@ -122,9 +137,8 @@ class Trial:
         self._shape = command_shaping(case.shaping, axes, period)
         self._simulate = simulating(machine, case.control)
         self._longer = case.shaping.longer(axes, period)
-        lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
-        settling = min(1.0 / case.control.position_gain, SLOWEST_LOOP) if lags else 0.0
-        self._measure = measuring(*window(settling, self._longer, period), WINDOW_MARGIN)
+        reach = window(settling_time(machine, case.control), self._longer, period)
+        self._measure = measuring(*reach, WINDOW_MARGIN)
         self._shaped: CommandState | None = None
         self._simulated: SimulationState | None = None
         self._measured: MeasuringState | None = None
@@ -181,6 +195,7 @@ def run(
     *,
     record: bool = False,
     all_signals: bool = False,
+    observers: Sequence[Observer] = (),
 ) -> Run:
     """Send a motion through every case and measure it.
 
@@ -198,6 +213,8 @@ def run(
         Keep the signals for a report.
     all_signals
         Keep every sample of them, however many there are.
+    observers
+        Who else sees every block.
 
     Raises
     ------
@@ -222,8 +239,8 @@ def run(
             trials = [Trial(case, machine, recorder) for case, recorder in zip(cases, recorders, strict=True)]
         if record and unshaped and block.toolpath is not None:
             outline.add(block.toolpath)
-        for trial in trials:
-            trial.advance(block)
+        for watcher in (*trials, *observers):
+            watcher.advance(block)
         if unshaped:
             samples += len(block.command)
             cycle_time = block.cycle_time
