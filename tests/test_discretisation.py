@@ -179,6 +179,8 @@ def test_modes_that_the_taps_cannot_tell_apart_are_refused():
     assert residual(discretise(shaper, 0.1, EXACT, [slow]), slow) < 1e-12
     with pytest.raises(InfeasibleError, match="100 ms"):
         discretise(late, 0.1, EXACT, [slow, fast])
+    with pytest.raises(InfeasibleError, match="100 ms"):  # nearly alike: there are taps, of thousands
+        discretise(late, 0.1, EXACT, [slow, Mode(11.001, 0.0)])
 
 
 @settings(max_examples=60)

@@ -102,6 +102,23 @@ def test_axes_stay_in_step_on_steady_motion(way, sample_time):
     assert_allclose(wanted.delay, common_delay(SHAPERS) + wanted.taps[0].latency * sample_time, rtol=1e-12)
 
 
+def test_exact_taps_that_keep_the_delay_are_the_neighbours_of_the_impulses_and_one_more():
+    wanted = filters({"x": SHAPERS["x"]}, ("x",), T, Interpolation.EXACT, MODES)
+    assert_array_equal(wanted.taps[0].used, [0, 1, 14, 15])
+    assert_allclose(wanted.delay, SHAPERS["x"].delay, rtol=1e-13)
+
+
+def test_a_cubic_that_needs_a_sample_ahead_delays_all_axes():
+    # the first impulse of x is 0.16 samples late, to be in step with y, whose first is at 0
+    shapers = {"x": zv(MODE), "y": zv(Mode(33.0, 0.02))}
+    wanted = filters(shapers, AXES, T, Interpolation.CUBIC, {})
+    assert [taps.latency for taps in wanted.taps] == [1, 1, 1]
+    delay = common_delay(shapers) + T
+    assert_allclose([taps.delay for taps in wanted.taps], delay, rtol=1e-12)
+    alone = filters(shapers, AXES, T, Interpolation.CUBIC, {}, aligned=False)
+    assert [taps.latency for taps in alone.taps] == [0, 0, 0]
+
+
 def test_without_alignment_every_axis_is_as_early_as_its_shaper():
     wanted = chosen(Interpolation.LINEAR, aligned=False)
     assert_allclose(

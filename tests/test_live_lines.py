@@ -189,6 +189,8 @@ def test_a_bad_line_ends_the_stream_at_its_place(place, monkeypatch, capfd, text
         (["--interpolation", "spline"], "unknown interpolation 'spline'"),
         (["--sample-time-s", "0"], "--sample-time-s must be positive and finite, not 0"),
         (["--sample-time-s", "nan"], "--sample-time-s must be positive"),
+        (["--closed"], "--closed is for programs"),
+        (["--dialect", "fanuc"], "--dialect is for programs"),
     ],
 )
 def test_what_a_stream_cannot_do(place, monkeypatch, capfd, words, message):

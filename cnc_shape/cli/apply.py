@@ -48,8 +48,12 @@ def apply(
 ) -> None:
     """Shape a program's axis commands and write them at the servo period."""
     if stream:
-        from cnc_shape.cli.streaming import stream_samples
+        from cnc_shape.cli.streaming import refuse_options, stream_samples
 
+        refuse_options(
+            {"--dialect": dialect != "auto", "--block-delete": block_delete, "--path": path != "polyline",
+             "--closed": closed, "--force": force}
+        )  # fmt: skip
         stream_samples(file, output, machine, interpolation, sample_time_s, json=json, quiet=quiet)
         return
     from cnc_shape.applying import Application

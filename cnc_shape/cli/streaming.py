@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
 
@@ -66,6 +66,19 @@ def stream_samples(
     for text in _shaped(lines, wanted):
         sys.stdout.buffer.write(text.encode("ascii"))
         sys.stdout.buffer.flush()
+
+
+def refuse_options(given: Mapping[str, bool]) -> None:
+    """Refuse the options that are given but say nothing about samples.
+
+    Raises
+    ------
+    OptionError
+        Names the first of them.
+    """
+    for option, is_given in given.items():
+        if is_given:
+            raise OptionError(f"{option} is for programs and files, not for --stream", hint="leave it out")
 
 
 @dataclass(frozen=True, slots=True)
