@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -112,11 +114,14 @@ SINGLE = {**PLAIN, "virtual_mode": lambda mode: virtual_mode(Mode(mode.natural_f
           "sd": lambda mode: sd(mode, duration_periods=0.8), "sd_long": lambda mode: sd(mode, duration_periods=1.3)}  # fmt: skip
 
 
+made = cache(lambda make, mode: make(mode))  # some take a second
+
+
 @pytest.mark.parametrize("mode", [MODE, DAMPED], ids=["undamped", "damped"])
 @pytest.mark.parametrize("interval", [1 / 11, 0.0731, 0.1436, 0.013])
 @pytest.mark.parametrize("make", SINGLE.values(), ids=SINGLE)
 def test_exact_taps_do_at_the_mode_what_the_shaper_does(make, interval, mode):
-    shaper = make(mode)
+    shaper = made(make, mode)
     taps = discretise(shaper, interval, EXACT, [mode])
     phasors = [
         sequence.amplitudes @ np.exp(

@@ -16,7 +16,10 @@ SUFFIXES = (".csv", ".npz")
 
 
 def apply(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="G-code or CSV; - for standard input.")],
+    file: Annotated[
+        str | None,
+        typer.Argument(metavar="FILE", help="G-code or CSV; - for standard input.", show_default=False),
+    ] = None,
     output: Annotated[
         str | None, typer.Option("-o", "--output", help="OUT.csv or OUT.npz; - for CSV on standard output.")
     ] = None,
@@ -26,10 +29,29 @@ def apply(
     path: PathStyle = "polyline",
     closed: Closed = False,
     force: Force = False,
+    stream: Annotated[
+        bool, typer.Option("--stream", help="Shape CSV samples line by line, from standard input to output.")
+    ] = False,
+    interpolation: Annotated[
+        str | None,
+        typer.Option(
+            help="With --stream, impulses between samples: exact, linear, cubic or rounded.",
+            show_default="exact",
+        ),
+    ] = None,
+    sample_time_s: Annotated[
+        float | None,
+        typer.Option(help="With --stream, interval of the samples.", show_default="as their times say"),
+    ] = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Shape a program's axis commands and write them at the servo period."""
+    if stream:
+        from cnc_shape.cli.streaming import stream_samples
+
+        stream_samples(file, output, machine, interpolation, sample_time_s, json=json, quiet=quiet)
+        return
     from cnc_shape.applying import Application
     from cnc_shape.cli.output import print_json, print_text, warn
     from cnc_shape.cli.progress import line_by_line, progress
@@ -38,21 +60,27 @@ def apply(
     from cnc_shape.errors import OptionError
     from cnc_shape.opening import open_motion
 
+    if file is None:
+        raise OptionError("missing argument 'FILE'", hint="name a program, or - for standard input")
+    if interpolation is not None or sample_time_s is not None:
+        raise OptionError(
+            "--interpolation and --sample-time-s are for live samples", hint="give --stream, too"
+        )
     if json and output == "-":
         raise OptionError("--json and -o - both want standard output", hint="name a file for the samples")
     target = _target(file, output, force=force)
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
-    shapers = setup.acting_shapers
+    kind = setup.planning.shaping
     with (
-        open_motion(file, setup, options) as motion,
+        open_motion(file, setup, options, [setup.timing(kind)]) as motion,
         progress("applying", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)
-        work = Application(blocks, setup.machine, shapers, setup.control.sample_time)
+        work = Application(blocks, setup.machine, setup.command_shaping(kind), setup.control.sample_time)
         _write(work, target, force=force)
         done = work.summary()
-    notes = [] if shapers else ["this machine has no shapers: the command is written unshaped"]
+    notes = [] if setup.acting_shapers else ["this machine has no shapers: the command is written unshaped"]
     warn([*motion.warnings(), *notes], quiet=quiet)
     if json:
         print_json("apply", _result(done, target))
