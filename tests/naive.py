@@ -423,7 +423,6 @@ def ideal_tool(command, axis):
     return tool
 
 
-<<<<<<< HEAD
 # contour and path shaping
 
 
@@ -467,7 +466,8 @@ def along_path(travelled, speed, acceleration, start, length, rows):
         pushed = [p.deriv()(s) * a + p.deriv(2)(s) * v**2 for p in cubic]
         out.append((position, velocity, pushed))
     return tuple(np.array(values) for values in zip(*out, strict=True))
-=======
+
+
 # --- live shaping ---------------------------------------------------------------------------------
 
 
@@ -482,4 +482,3 @@ def filtered(samples, weights):
                 total += weight * samples[min(max(n - k, 0), len(samples) - 1)]
         out.append(total)
     return np.array(out)
->>>>>>> stream

@@ -469,6 +469,20 @@ def test_alike_axes_are_one_for_duet(capfd):
     assert_allclose(times, load_machine(bundled("xy_stage.yaml")).shapers["x"].times, atol=1.0 / CLOCK)
 
 
+def test_a_c_header_has_the_machines_sample_time_or_the_one_given(capfd):
+    assert run(["design", "zvd", *WORDS, "--emit", "c"]) == 0
+    assert "#define CNC_SHAPE_SAMPLE_TIME_S 0.001\n" in capfd.readouterr().out
+    assert run(["design", "zvd", *WORDS, "--emit", "c", "--sample-time-s", "0.002"]) == 0
+    assert "#define CNC_SHAPE_SAMPLE_TIME_S 0.002\n" in capfd.readouterr().out
+    assert run(["design", "-m", str(bundled("container.yaml")), "--emit", "c"]) == 0
+    said = capfd.readouterr().out
+    assert "#define CNC_SHAPE_SAMPLE_TIME_S 0.005\n" in said
+    assert "static const double cnc_shape_x_taps[" in said
+    assert "taps of --emit c" in refused(
+        capfd, "design", "zvd", *WORDS, "--emit", "rrf", "--sample-time-s", "1"
+    )
+
+
 def test_help_tells_of_every_target(capfd):
     assert run(["design", "--help"]) == 0
     said = " ".join(capfd.readouterr().out.replace("│", " ").split())

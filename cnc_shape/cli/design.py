@@ -91,8 +91,12 @@ def design(
         typer.Option(
             metavar="TARGET",
             help="Print the text that hands the shaper to a controller: rrf, rrf-3.4, klipper, "
-            "klipper-custom, marlin, marlin-ft, yaml or json. Without SHAPER the machine's own shapers.",
+            "klipper-custom, marlin, marlin-ft, c, yaml or json. Without SHAPER the machine's own shapers.",
         ),
+    ] = None,
+    sample_time_s: Annotated[
+        Number,
+        typer.Option(help="--emit c: sample time of the taps; the machine's, or 0.001.", show_default=False),
     ] = None,
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the shaper, or the comparison: .png, .svg, .pdf.")
@@ -111,6 +115,7 @@ def design(
     from cnc_shape.cli.subjects import subjects_of
 
     target = None if emit is None else emitting.target_of(emit)
+    sample_time = emitting.sample_time_of(sample_time_s, machine, target)
     options: dict[str, object] = {
         "duration_s": duration_s, "duration_periods": duration_periods, "max_amplitude": max_amplitude,
         "virtual_frequency_hz": virtual_frequency_hz, "min_gap_s": min_gap_s, "metric": metric,
@@ -125,7 +130,7 @@ def design(
         if frequency_hz or damping_ratio or frequency_uncertainty or damping_uncertainty or plot is not None:
             raise emitting.no_shaper()
         designing.refuse_options(given)
-        emitting.hand_over_configured(machine, axis, target, json=json)
+        emitting.hand_over_configured(machine, axis, target, sample_time_s, json=json)
         return
     subjects, corner = subjects_of(
         frequency_hz or [], damping_ratio or [], frequency_uncertainty or [], damping_uncertainty or [],
@@ -138,7 +143,9 @@ def design(
         return
     designs = designing.design_one(subjects, shaper, given)
     result = (
-        None if target is None else emitting.handed_over(designs, target, corner, sensitivity=sensitivity)
+        None
+        if target is None
+        else emitting.handed_over(designs, target, corner, sample_time, sensitivity=sensitivity)
     )
     drawing(lambda: designing.design_figure(designs))
     if result is None:

@@ -13,7 +13,7 @@ from cnc_shape.cli.subjects import check_axis
 from cnc_shape.errors import OptionError
 from cnc_shape.report.shaper_sheet import Corner
 from cnc_shape.shapers.comparison import Design
-from cnc_shape.writers.firmware import EMITTERS, Handover, Target
+from cnc_shape.writers.firmware import DEFAULT_SAMPLE_TIME, Handover, Target, emit
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,28 @@ def no_shaper() -> OptionError:
     )
 
 
-def handed_over(designs: Sequence[Design], target: Target, corner: Corner, *, sensitivity: bool) -> Emitted:
+def sample_time_of(given: float | None, machine: str | None, target: Target | None) -> float:
+    """Sample time of a C header's taps, s: the one given, else the machine's where one is named.
+
+    Raises
+    ------
+    OptionError
+        One is given for a target without samples.
+    """
+    if given is not None and target is not Target.C:
+        raise OptionError("--sample-time-s is for the taps of --emit c", hint="leave it out")
+    if given is not None:
+        return given
+    if target is Target.C and machine is not None:
+        from cnc_shape.config.machine_file import load_machine
+
+        return load_machine(machine).control.sample_time
+    return DEFAULT_SAMPLE_TIME
+
+
+def handed_over(
+    designs: Sequence[Design], target: Target, corner: Corner, sample_time: float, *, sensitivity: bool
+) -> Emitted:
     """Designs as the text of `target`.
 
     Raises
@@ -59,13 +80,14 @@ def handed_over(designs: Sequence[Design], target: Target, corner: Corner, *, se
     if target is Target.JSON:
         text = dumps({"schema": "cnc-shape/design/1", **result}, indent=2, allow_nan=False)
     else:
-        text = EMITTERS[target](
-            [Handover(one.axis, one.name, one.options, one.modes, one.shaper) for one in designs]
-        )
+        handovers = [Handover(one.axis, one.name, one.options, one.modes, one.shaper) for one in designs]
+        text = emit(target, handovers, sample_time)
     return Emitted(target, text, result)
 
 
-def hand_over_configured(machine: str | None, axis: str | None, target: Target, *, json: bool) -> None:
+def hand_over_configured(
+    machine: str | None, axis: str | None, target: Target, sample_time: float | None, *, json: bool
+) -> None:
     """Print the shapers that a machine file gives its axes as the text of `target`.
 
     Raises
@@ -89,7 +111,8 @@ def hand_over_configured(machine: str | None, axis: str | None, target: Target, 
         for name, choice in setup.choices.items()
         if axis in (None, name)
     ]
-    show(Emitted(target, EMITTERS[target](handovers), {}), json=json)
+    text = emit(target, handovers, sample_time or setup.control.sample_time)
+    show(Emitted(target, text, {}), json=json)
 
 
 def show(emitted: Emitted, *, json: bool) -> None:

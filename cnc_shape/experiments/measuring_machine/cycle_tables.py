@@ -9,6 +9,7 @@ from cnc_shape.experiments.measuring_machine import probing
 from cnc_shape.experiments.straight_motion import settled
 from cnc_shape.shapers import NONE, zv
 
+SHOWN = 5e-4  # µm, digits of what is 0 but for rounding
 LEVELS = (1e-3, 1e-2, 2e-2, 4e-2, 5e-2)  # mm, from which the approach may count as steady
 SETTLING = {  # ms, what the model was known to give
     "unshaped": 1182.0,
@@ -28,7 +29,7 @@ def cycle_table() -> Table:
     for name, shaper in probing.shapers().items():
         found = probing.cycle(shaper)
         rows += [
-            Row(f"{name}: vibration after the gross move", "µm", None, 1e3 * found.ring, 0.0,
+            Row(f"{name}: vibration after the gross move", "µm", None, 1e3 * found.ring, SHOWN,
                 "amplitude at its end; exact response"),
             Row(f"{name}: probe hangs within 2 µm", "ms", None, 1e3 * found.settling, 0.0,
                 f"from the end of the unshaped gross move; the specification's model: {SETTLING[name]:g} ms"),
@@ -75,9 +76,9 @@ def program_table() -> Table:
             Row(f"{name}: probe hangs within 2 µm", "ms", None, 1e3 * found, 0.0,
                 f"{how}, sampled every ms; from the end of the unshaped gross move"),
             Row(f"{name}: contour error of the probe, largest", "µm", None,
-                1e3 * summaries[name].tool.max, 0.0, how),
+                1e3 * summaries[name].tool.max, SHOWN, how),
             Row(f"{name}: deflection when the approach begins", "µm", None,
-                1e3 * float(np.abs(bent[begun]).max()), 0.0,
+                1e3 * float(np.abs(bent[begun]).max()), SHOWN,
                 f"{how}; largest in the first period of the approach"),
         ]  # fmt: skip
     return Table(

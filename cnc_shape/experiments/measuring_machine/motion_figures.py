@@ -90,7 +90,7 @@ def stage_error() -> Figure:
     """Fig. 8: position error of the stage without shaping."""
     figure, (axes,) = new_figure(WIDTH, 2.9)
     _draw_stage_errors(axes, ("unshaped",))
-    axes.set_title("Fig. 8: position error, unshaped")
+    axes.set_title("Fig. 8: position error, unshaped (dashed: end of the move)")
     return figure
 
 
@@ -116,7 +116,7 @@ def stage_errors() -> Figure:
     """Fig. 10: position errors with and without shaping."""
     figure, (axes,) = new_figure(WIDTH, 3.4)
     _draw_stage_errors(axes, tuple(stage.shapers()))
-    axes.set_title("Fig. 10: position error with and without shaping")
+    axes.set_title("Fig. 10: position error, unshaped and shaped (dashed: end of the unshaped move)")
     return figure
 
 
@@ -178,7 +178,7 @@ def probe_deflection() -> Figure:
         for edge in (0.0, 1e3 * probing.PAUSE):
             axes.axvline(edge, color=PATH_COLOUR, linewidth=0.8, linestyle=DOTTED)
         axes.set(xlim=(-120.0, 480.0), ylim=(-0.8 * height, height), ylabel="deflection (µm)")
-    wide.set_title("Fig. 13: deflection of the probe in pause and approach")
+    wide.set_title("Fig. 13: deflection of the probe (dashed: pause of the unshaped cycle)")
     wide.legend(loc="upper right", ncols=3)
     near.set_title("the same, closer")
     near.set_xlabel("time from the end of the unshaped gross move (ms)")

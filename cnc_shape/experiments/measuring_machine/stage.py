@@ -17,6 +17,7 @@ from cnc_shape.shapers import NONE, Shaper, cascade, multi_mode
 MACHINE, AXIS = "xy_stage.yaml", "x"
 DISTANCE = 100.0  # mm
 SETTLED = 0.010  # mm, within which the stage is in position
+SHOWN = 5e-4  # µm, digits of what is 0 but for rounding
 STEP, WATCHED = 2e-5, 2.0  # s
 
 
@@ -64,7 +65,7 @@ def stage_table() -> Table:
             rows.append(Row(f"{name}: duration of the shaper", "ms", None, 1e3 * shaper.duration, 0.0,
                             "impulses at " + ", ".join(f"{1e3 * t:.3f}" for t in shaper.times.tolist())
                             + " ms"))  # fmt: skip
-        rows.append(Row(f"{name}: vibration after the end", "µm", None, ring, 0.0, "exact response"))
+        rows.append(Row(f"{name}: vibration after the end", "µm", None, ring, SHOWN, "exact response"))
         rows.append(Row(f"{name}: in position after", "ms", None, 1e3 * settling(shaper), 0.0,
                         "within 10 µm for good, from the end of the unshaped move"))  # fmt: skip
     return Table(

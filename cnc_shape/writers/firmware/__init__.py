@@ -5,9 +5,10 @@ cannot carry is refused with the nearest that it can; what it rounds or computes
 comment, with the vibration that is left then.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 
+from cnc_shape.writers.firmware.c_source import DEFAULT_SAMPLE_TIME, c_source
 from cnc_shape.writers.firmware.duet import rrf, rrf_3_4
 from cnc_shape.writers.firmware.handover import Emit, Handover
 from cnc_shape.writers.firmware.klipper import klipper, klipper_custom
@@ -24,6 +25,7 @@ class Target(Enum):
     KLIPPER_CUSTOM = "klipper-custom"
     MARLIN = "marlin"
     MARLIN_FT = "marlin-ft"
+    C = "c"
     YAML = "yaml"
     JSON = "json"  # the result of the design itself
 
@@ -38,4 +40,16 @@ EMITTERS: Mapping[Target, Emit] = {
     Target.YAML: yaml,
 }
 
-__all__ = ["EMITTERS", "Emit", "Handover", "Target"]
+
+def emit(target: Target, designs: Sequence[Handover], sample_time: float = DEFAULT_SAMPLE_TIME) -> str:
+    """Write shapers for a target; `sample_time`, s, is that of the taps of a C header.
+
+    Raises
+    ------
+    OptionError, InfeasibleError
+        What the target cannot carry.
+    """
+    return c_source(designs, sample_time) if target is Target.C else EMITTERS[target](designs)
+
+
+__all__ = ["DEFAULT_SAMPLE_TIME", "EMITTERS", "Handover", "Target", "emit"]
