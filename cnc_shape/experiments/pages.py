@@ -109,7 +109,9 @@ def page(result: Result, kind: Format = "svg") -> str:
     ]
     if experiment.figures:
         parts.append("## Figures")
-        parts += [f"![{name}]({_figure_file(result, name, kind)})" for name in experiment.figures]
+        parts += [
+            f"![{name.replace('_', ' ')}]({_figure_file(result, name, kind)})" for name in experiment.figures
+        ]
     return "\n\n".join(parts) + "\n"
 
 
