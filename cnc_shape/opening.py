@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cnc_shape.config.setup import Setup
-from cnc_shape.machine import LINEAR_DEFAULT
+from cnc_shape.machine import LINEAR_DEFAULT, Machine
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
@@ -28,6 +28,7 @@ class OpenMotion:
     blocks: Iterator[Block]
     notes: list[Note] = field(default_factory=list[Note])
     moved: tuple[str, ...] = ()
+    timed: bool = False  # the file tells its own times, and nothing was planned
 
     def warnings(self, *, by_name: bool = False) -> list[str]:
         """What machine file and reader had to say, and which axes the machine does not describe.
@@ -52,10 +53,13 @@ class OpenMotion:
 
 
 @contextmanager
-def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) -> Generator[OpenMotion]:
+def open_motion(
+    path: str, setup: Setup, options: ReadingOptions | None = None, planner: Machine | None = None
+) -> Generator[OpenMotion]:
     """Open a file and plan it as it is read; where it tells the time itself, replay it.
 
-    Tool lengths are the machine's where `options` have none.
+    Tool lengths are the machine's where `options` have none. The planner keeps the limits of `planner`,
+    by default the machine's own.
 
     Raises
     ------
@@ -74,9 +78,10 @@ def open_motion(path: str, setup: Setup, options: ReadingOptions | None = None) 
         if opened.timed is not None:
             command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
             blocks = replaying(command, toolpath)
+            motion.timed = True
         else:
             chunks = _noted(opened.chunks, motion.notes)
-            blocks = moving(chunks, setup.machine, setup.planning.path_tolerance, period)
+            blocks = moving(chunks, planner or setup.machine, setup.planning.path_tolerance, period)
         motion.blocks = _watched(blocks, motion)
         yield motion
 

@@ -104,8 +104,8 @@ def _compare(
             apart[:, k] = np.interp(time, clock, place[:, k]) - column
         for kind, members in enumerate((linear, rotary)):
             distance: FloatArray = np.sqrt((apart[:, members] ** 2).sum(axis=1))
-            worst[kind] = max(worst[kind], float(distance.max()))
-        passed = max(int(np.searchsorted(clock, time[-1])) - 1, 0)
+            worst[kind] = max(worst[kind], float(np.max(distance)))
+        passed = max(np.count_nonzero(clock < time[-1]) - 1, 0)
         clock, place = clock[passed:], place[passed:]
     for more in knots:
         now += float(more[0].sum())
