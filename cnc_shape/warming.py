@@ -28,6 +28,7 @@ from cnc_shape.recording.extremes import BUCKETS
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.writers.points import points_file, points_of
+from cnc_shape.writers.program import write_program
 
 MACHINES = ("xy_stage.yaml", "mill_three_axis.yaml")  # ideal and lagging drives, with modes and without
 SMALL_CHUNK = 4  # rows, so that every stage is entered with a state
@@ -101,8 +102,7 @@ def _simulate(path: Path, setup: Setup, options: ReadingOptions) -> None:
 def _apply(path: Path, setup: Setup, options: ReadingOptions) -> None:
     with open_motion(str(path), setup, options) as motion:
         work = Application(motion.blocks, setup.machine, setup.acting_shapers, setup.control.sample_time)
-        for _ in work.blocks():
-            pass
+        write_program(path.with_suffix(".shaped.nc"), work.blocks(), force=True)
         work.summary()
 
 

@@ -62,7 +62,7 @@ def find_knots(points, directions, slack, rest, origin, latest, low, high, first
         if begin == first and still < rest:
             for m in range(slope.size):
                 if slope[m] < low[m] or slope[m] > high[m]:
-                    begin = seen - 1
+                    begin = seen - max(still, 1)  # not in the middle of a standstill
         if begin > first:
             numbers[found] = first = begin
             knots[found] = origin[:] = latest

@@ -89,7 +89,7 @@ def _compare(
 ) -> Proof:
     rotary = [k for k, axis in enumerate(axes) if axis in ROTARY]
     linear = [k for k, axis in enumerate(axes) if axis not in ROTARY]
-    clock, place = np.zeros(0), np.zeros((0, len(axes)))  # knots that samples to come lie between
+    clock, place = np.zeros(1), np.zeros((1, len(axes)))  # knots that samples to come lie between
     now, samples = 0.0, 0
     worst = [0.0, 0.0]
     for columns in command:
