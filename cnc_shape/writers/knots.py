@@ -25,6 +25,7 @@ from cnc_shape.writers.samples import positions
 DECIMALS = 6  # of mm and degrees at least
 STEPS = 100.0  # in the tolerance at least: rounding takes little of it
 LEFT_OUT = 2.0  # steps of the tolerance that rounding of coordinates and times may take
+DRIFT = 0.1  # of the tolerance, left for drifts that are held: see creep.py
 REST = 8  # periods without motion that are a rest
 SMALLEST, LARGEST = 1e-6, 1.0  # mm, tolerances that make sense
 
@@ -96,7 +97,7 @@ def knotting(grid: Grid) -> KnotStep:
 
     def step(state: KnotState | None, command: Trajectory, last: bool) -> tuple[KnotState | None, Knots]:
         directions, cover = _directions(command.axes)
-        slack = cover * (grid.tolerance * grid.steps - LEFT_OUT)
+        slack = cover * ((1.0 - DRIFT) * grid.tolerance * grid.steps - LEFT_OUT)
         now = state or _nothing_yet(*directions.shape)
         place = np.rint(positions(command, now.seen) * grid.steps) + 0.0  # no -0
         origin, latest, low, high = now.origin.copy(), now.latest.copy(), now.low.copy(), now.high.copy()

@@ -2,9 +2,9 @@
 
 ::
 
-    command -> knots.py: straight pieces -> text, under a hidden name
-       |                                      |
-       +--> spool ------------> proof.py: read back and compared, sample by sample -> published
+    command -> knots.py: straight pieces -> creep.py: none too slow -> text, under a hidden name
+       |                                                                |
+       +--> spool -------------------------> proof.py: read back and compared, sample by sample -> published
 
 A move carries all axes and ``F``, the reciprocal of its time in minutes (G93). Times are rounded like
 coordinates; what a move lacks the next one takes up, so that every knot stays on the clock of the samples. A
@@ -22,7 +22,8 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.errors import OutputError
 from cnc_shape.trajectory import Trajectory
 from cnc_shape.units import MICROMETRE
-from cnc_shape.writers.knots import Grid, Knots, KnotState, knotting, make_grid
+from cnc_shape.writers.creep import CreepStep, Place, without_creep
+from cnc_shape.writers.knots import Grid, Knots, knotting, make_grid
 from cnc_shape.writers.proof import Proof, read_back
 from cnc_shape.writers.publish import publishing
 from cnc_shape.writers.samples import positions
@@ -120,19 +121,29 @@ def stream_program(
     write: Write, blocks: Iterable[Trajectory], grid: Grid, remarks: Sequence[str] = ()
 ) -> tuple[int, int]:
     """Write the lines of a program; return the number of straight moves and of rests."""
-    step = knotting(grid)
-    state: KnotState | None = None
+    find, found = knotting(grid), None
+    hasten: CreepStep | None = None
+    here: Place | None = None
     text: _Text | None = None
-    block: Trajectory | None = None
-    for block in blocks:
+    for block, last in _with_end(blocks):
+        hasten = hasten or without_creep(block.axes, block.sample_time, grid)
         text = text or _Text(write, block.axes, block.sample_time, grid, remarks)
-        state, knots = step(state, block, False)
+        found, knots = find(found, block, last)
+        here, knots = hasten(here, knots, last)
         text.add(knots)
-    if text is None or block is None:
+    if text is None:
         raise ValueError("a command without a single block is no program")
-    text.add(step(state, block.cut(slice(0, 0)), True)[1])
     write(b"G94\nM2\n")
     return text.segments, text.rests
+
+
+def _with_end(blocks: Iterable[Trajectory]) -> Iterator[tuple[Trajectory, bool]]:
+    """Pair each block with whether it is the last, which is an empty one."""
+    block: Trajectory | None = None
+    for block in blocks:
+        yield block, False
+    if block is not None:
+        yield block.cut(slice(0, 0)), True
 
 
 class _Text:
