@@ -52,6 +52,8 @@ def without_creep(axes: Sequence[str], sample_time: float, grid: Grid) -> CreepS
         linear, turn = _travels(np.diff(knots.place, axis=0, prepend=here.place[None, :]), rotary)
         least = slowest * periods
         slow = np.where(linear > 0.0, linear < least, (turn > 0.0) & (turn < least))
+        if not (slow.any() or here.drifted):
+            return Place(int(knots.sample[-1]), knots.place[-1]), knots
         way: list[Place] = []
         for row in range(len(knots)):
             end = Place(int(knots.sample[row]), knots.place[row])

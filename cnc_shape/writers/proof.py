@@ -67,8 +67,9 @@ def _knots(path: Path, axes: Sequence[str]) -> Iterator[tuple[FloatArray, FloatA
     rotary = np.array([axis in ROTARY for axis in axes])
     for chunk in read_chunks(path, ReadingOptions(gcode=GcodeOptions(Dialect.RS274), limits=limits)):
         if chunk.axes != tuple(axes):
+            found, wanted = (", ".join(names).upper() for names in (chunk.axes, axes))
             raise OutputError(
-                f"the program moves {chunk.axes}, the command {tuple(axes)}",
+                f"what was written moves {found}, the command {wanted}",
                 hint="nothing was published; report this",
             )
         yield durations(chunk), np.where(rotary, chunk.target / DEGREE, chunk.target)
