@@ -5,10 +5,11 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench clean
+.PHONY: help demo papers test lint bench clean
 
 help:
 	@echo "make demo    simulate the bundled sample and write its report"
+	@echo "make papers  run the papers again: docs/papers, their pages and figures"
 	@echo "make test    run the whole test suite"
 	@echo "make lint    ruff, pyright, import-linter"
 	@echo "make bench   measure against named peers"
@@ -34,6 +35,9 @@ $(VENV)/.bench: $(VENV)/.test
 
 demo: $(VENV)/.run
 	$(BIN)/cnc-shape simulate --report
+
+papers: $(VENV)/.run
+	$(BIN)/cnc-shape reproduce --output docs/papers --figures svg --force
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)

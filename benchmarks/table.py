@@ -24,6 +24,7 @@ SCRIPTS = (
     "look_ahead",
     "sampling",
     "shaping",
+    "live_shaping",
     "servo_loop",
     "contour_error",
     "whole_chain",
@@ -54,8 +55,12 @@ def run(script: str, options: Sequence[str]) -> tuple[list[Row], int]:
 
 def table(rows: Iterable[Row]) -> str:
     """Return the rows as a table that reads as text and as Markdown."""
-    cells = [HEADINGS, *(row.cells() for row in rows)]
-    widths = [max(len(row[column]) for row in cells) for column in range(len(HEADINGS))]
+    return aligned([HEADINGS, *(row.cells() for row in rows)])
+
+
+def aligned(cells: Sequence[Sequence[str]]) -> str:
+    """Return rows of cells, the headings first, as a table that reads as text and as Markdown."""
+    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
     lines = [
         "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |"
         for row in cells

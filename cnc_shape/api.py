@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cnc_shape.cases import default_cases, pick_cases, timings
 from cnc_shape.config.dump import dump_machine
 from cnc_shape.config.setup import Setup
 from cnc_shape.opening import digest, open_motion
-from cnc_shape.pipeline import Run, default_cases, pick_cases, run
+from cnc_shape.pipeline import Run, run
 from cnc_shape.readers import ReadingOptions
 from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.report import folder as run_folder
@@ -50,7 +51,7 @@ def simulate_program(
         Keep every sample of them, however many there are.
     """
     picked = default_cases(setup) if cases is None else pick_cases(setup, cases)
-    with open_motion(str(path), setup, options) as motion:
+    with open_motion(str(path), setup, options, timings(picked)) as motion:
         return run(motion.blocks, setup, picked, motion.name, record=record, all_signals=all_signals)
 
 

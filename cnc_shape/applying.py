@@ -18,8 +18,7 @@ from cnc_shape.limits import Limits
 from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
 from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, window
-from cnc_shape.shapers import Shaper
-from cnc_shape.shapers.shaping import delays, shaping
+from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.trajectory import Trajectory
 
 
@@ -59,11 +58,11 @@ class Application:
     """A motion being shaped: draw `blocks` to the end, then ask for the `summary`."""
 
     def __init__(
-        self, motion: Iterable[Block], machine: Machine, shapers: Mapping[str, Shaper], sample_time: float
+        self, motion: Iterable[Block], machine: Machine, shaping: CommandShaping, sample_time: float
     ) -> None:
         self._motion = motion
         self._machine = machine
-        self._shapers = shapers
+        self._shaping = shaping
         self._sample_time = sample_time
         self._axes: tuple[str, ...] = ()
         self._tally = Tally()
@@ -71,23 +70,23 @@ class Application:
         self._speed = self._push = np.zeros(0)  # (d,) largest velocity and acceleration, shaped
         self._limits: list[Limits] = []
         self._samples = 0
-        self._cycle_time = self._longest = 0.0
+        self._cycle_time = self._longer = 0.0
 
     def blocks(self) -> Iterator[Trajectory]:
         """Yield the shaped command, block by block."""
-        shape = shaping(self._shapers, self._sample_time)
-        shaped: Trajectory | None = None
+        shaped: CommandState | None = None
         measured: MeasuringState | None = None
-        measure = velocity = acceleration = None
+        shape = measure = velocity = acceleration = None
         for block in self._motion:
-            if measure is None or velocity is None or acceleration is None:
+            if shape is None or measure is None or velocity is None or acceleration is None:
                 self._axes = block.command.axes
                 self._limits = [axis.limits for axis in self._machine.with_axes(self._axes).axes]
                 velocity = frozen([limits.velocity for limits in self._limits])
                 acceleration = frozen([limits.acceleration for limits in self._limits])
                 self._speed = self._push = np.zeros(len(self._axes))
-                self._longest = delays(self._shapers, self._axes, self._sample_time).longest
-                measure = measuring(*window(0.0, self._longest, self._sample_time), WINDOW_MARGIN)
+                shape = command_shaping(self._shaping, self._axes, self._sample_time)
+                self._longer = self._shaping.longer(self._axes, self._sample_time)
+                measure = measuring(*window(0.0, self._longer, self._sample_time), WINDOW_MARGIN)
             largest_ratio(block.command.velocity, velocity, self._plain)
             largest_ratio(block.command.acceleration, acceleration, self._plain)
             shaped, command = shape(shaped, block.command, block.last)
@@ -110,7 +109,7 @@ class Application:
         }
         return Applied(
             self._cycle_time,
-            self._cycle_time + self._longest,
+            self._cycle_time + self._longer,
             self._samples,
             self._sample_time,
             self._axes,

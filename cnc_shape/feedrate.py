@@ -10,7 +10,7 @@ distance, whatever the number of blocks.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -78,42 +78,46 @@ class PlanningState:
     clock: FloatArray  # (3,) s, its rounding error, squared speed at the first cell
     before_v2: float  # squared speed limit of the cell before the first one
     patience: int  # cells to gather before the next attempt
+    passed: int  # cells of the program before the first one
 
 
 PlanningStep: TypeAlias = Callable[[PlanningState | None, Path, bool], tuple[PlanningState | None, Profile]]
 
 
-def planning(limits: Sequence[Limits]) -> PlanningStep:
+def planning(limits: Sequence[Limits], gentleness: FloatArray | None = None) -> PlanningStep:
     """Return the resumable step from Path to Profile: ``step(state, chunk, last) -> (state, profile)``.
 
     Parameters
     ----------
     limits
         One per axis of the path, in the order of `path.axes`. Jerk is not limited.
+    gentleness
+        One factor in (0, 1] for each cell of the program: of the accelerations, its square root of the feed.
     """
     velocity = frozen([limit.velocity for limit in limits])
     acceleration = frozen([limit.acceleration for limit in limits])
 
     def step(state: PlanningState | None, path: Path, last: bool) -> tuple[PlanningState | None, Profile]:
         _check(path, velocity, acceleration)
-        before = state or PlanningState((), frozen(np.zeros(3)), np.inf, PATIENCE)
+        before = state or PlanningState((), frozen(np.zeros(3)), np.inf, PATIENCE, 0)
         parts = (*before.parts, path) if len(path) else before.parts
         gathered = sum(len(part) for part in parts)
         if gathered == 0 or (not last and gathered < before.patience):
-            waiting = None if last else PlanningState(parts, before.clock, before.before_v2, before.patience)
+            waiting = None if last else replace(before, parts=parts)
             return waiting, _no_pieces(path.cut(slice(0, 0)))
         whole = join_paths(parts)
+        asked, feed_rate = _gentle(whole, gentleness, before.passed)
         limit_v2, straight = speed_limits(
-            whole.coefficients, whole.length, whole.feed_rate, rotary_only(whole), velocity, acceleration
+            asked, whole.length, feed_rate, rotary_only(whole), velocity, acceleration
         )
         reach_v2, free = backward(
-            whole.coefficients, whole.length, whole.stop, limit_v2, straight, acceleration, before.before_v2
+            asked, whole.length, whole.stop, limit_v2, straight, acceleration, before.before_v2
         )
         final = len(whole) if last else int(np.flatnonzero(free[:-1])[-1]) if free[:-1].any() else 0
         clock = before.clock.copy()
         done = whole.cut(slice(0, final))
         pieces, cell = forward(
-            done.coefficients,
+            asked[:final],
             done.length,
             done.stop,
             done.dwell,
@@ -133,7 +137,8 @@ def planning(limits: Sequence[Limits]) -> PlanningStep:
             return None, profile
         rest = whole.cut(slice(final, None))
         limit_before = float(limit_v2[final - 1, 1]) if final else before.before_v2
-        return PlanningState((rest,), frozen(clock), limit_before, 2 * len(rest) + PATIENCE), profile
+        patience, passed = 2 * len(rest) + PATIENCE, before.passed + final
+        return PlanningState((rest,), frozen(clock), limit_before, patience, passed), profile
 
     return step
 
@@ -183,6 +188,18 @@ def worst_violation(profile: Profile, limits: Sequence[Limits], points: int = 9)
         float(worst[4]),
         line,
     )
+
+
+def _gentle(path: Path, gentleness: FloatArray | None, passed: int) -> tuple[FloatArray, FloatArray]:
+    """What the scans plan for: a path whose derivatives, and whose accelerations with them, are larger.
+
+    A cell with the factor g is planned as ``q/g`` at the feed ``F/sqrt(g)``: then ``q'' <= g a`` and the
+    speed is at most ``sqrt(g) F``.
+    """
+    if gentleness is None:
+        return path.coefficients, path.feed_rate
+    factor = gentleness[passed : passed + len(path)]
+    return frozen(path.coefficients / factor[:, None, None]), frozen(path.feed_rate / np.sqrt(factor))
 
 
 def _check(path: Path, velocity: FloatArray, acceleration: FloatArray) -> None:

@@ -6,23 +6,26 @@ same blocks. Only what the stages hold back is in memory, whatever the program's
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeAlias
 
 import numpy as np
 
+from cnc_shape.chunks import with_last
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.feedrate import planning
+from cnc_shape.feedrate import PlanningState, Profile, planning
 from cnc_shape.machine import Machine
 from cnc_shape.program import Program
-from cnc_shape.smoothing import Smoothing, smoothing
+from cnc_shape.shapers.path_shaping import PathShapingState, path_sampling
+from cnc_shape.smoothing import Path, Smoothing, smoothing
+from cnc_shape.timing import PLAIN, Timing, rested
 from cnc_shape.toolpath import Toolpath, building, check_travel
-from cnc_shape.trajectory import Trajectory, sampling
+from cnc_shape.trajectory import SamplingState, Trajectory, sampling
 
 STILL = 1e-9  # mm or rad, an axis that moves no farther does not move
 
-T = TypeVar("T")
+Drawn: TypeAlias = tuple[float, Trajectory]  # s, end of the motion so far; samples of it
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -34,25 +37,17 @@ class Block:
     last: bool
     cycle_time: float  # s, exact duration of the motion so far; of all of it in the last block
     moved: tuple[str, ...]  # axes that have moved so far
-
-
-def with_last(items: Iterable[T]) -> Iterator[tuple[T, bool]]:
-    """Pair every item with whether it is the last."""
-    iterator = iter(items)
-    try:
-        held = next(iterator)
-    except StopIteration:
-        return
-    for item in iterator:
-        yield held, False
-        held = item
-    yield held, True
+    timing: Timing | None = None  # which of the motions that run side by side; None: there is only one
 
 
 def moving(
-    program: Iterable[Program], machine: Machine, path_tolerance: float, sample_time: float
+    program: Iterable[Program],
+    machine: Machine,
+    path_tolerance: float,
+    sample_time: float,
+    timings: Sequence[Timing] = (PLAIN,),
 ) -> Iterator[Block]:
-    """Plan and sample a program, chunk by chunk.
+    """Plan and sample a program, chunk by chunk, once for each timing.
 
     Parameters
     ----------
@@ -64,6 +59,8 @@ def moving(
         mm, where the program does not say.
     sample_time
         s.
+    timings
+        Distinct; the blocks of the motions come in turns, each motion's in its own order.
 
     Raises
     ------
@@ -72,14 +69,13 @@ def moving(
         without travel.
     """
     build, smooth = building(), smoothing(Smoothing(path_tolerance))
-    built = smoothed = planned = sampled = None
-    plan = None
-    draw = sampling(sample_time)
+    built = smoothed = None
+    drives: list[_Drive] = []
     moved = np.zeros(0, dtype=np.bool_)
     for chunk, last in with_last(program):
-        if plan is None:
+        if not drives:
             machine = machine.with_axes(chunk.axes)
-            plan = planning(tuple(axis.limits for axis in machine.axes))
+            drives = [_Drive(timing, machine, sample_time) for timing in timings]
             moved = np.zeros(len(chunk.axes), dtype=np.bool_)
         low, high = check_travel(chunk, {axis.name: axis.limits.travel for axis in machine.axes})
         moved |= np.ptp(np.vstack([chunk.start, low, high]), axis=0) > STILL
@@ -89,16 +85,61 @@ def moving(
             )
         built, toolpath = build(built, chunk, last)
         smoothed, path = smooth(smoothed, toolpath, last)
-        try:
-            planned, profile = plan(planned, path, last)
-        except InfeasibleError as error:
-            error.source = error.source or chunk.source
-            raise
         names = tuple(axis for axis, seen in zip(chunk.axes, moved, strict=True) if seen)
+        for drive in drives:
+            yield from drive.blocks(toolpath, path, names, chunk.source, last=last)
+
+
+class _Drive:
+    """One timing's way along the path that all of them share."""
+
+    def __init__(self, timing: Timing, machine: Machine, sample_time: float) -> None:
+        gentle = None if timing.slowdown is None else timing.slowdown.factor
+        self._timing = timing
+        self._plan = planning(tuple(axis.limits for axis in machine.axes), gentle)
+        self._draw = drawing(timing, sample_time)
+        self._planned: PlanningState | None = None
+        self._begun = False
+
+    def blocks(
+        self, toolpath: Toolpath, path: Path, moved: tuple[str, ...], source: str, *, last: bool
+    ) -> Iterator[Block]:
+        path = rested(path, self._timing.stop_dwell, first=not self._begun, last=last)
+        self._begun = self._begun or len(path) > 0
+        try:
+            self._planned, profile = self._plan(self._planned, path, last)
+        except InfeasibleError as error:
+            error.source = error.source or source
+            raise
         pending: Toolpath | None = toolpath
-        for (drawn, command), end in with_last(draw(sampled, profile, last)):
-            yield Block(pending, command, last and end, drawn.end_time, names)
-            pending, sampled = None, drawn
+        for (end_time, command), end in with_last(self._draw(profile, last)):
+            yield Block(pending, command, last and end, end_time, moved, self._timing)
+            pending = None
+
+
+def drawing(timing: Timing, sample_time: float) -> Callable[[Profile, bool], Iterator[Drawn]]:
+    """Return what samples the profiles of one motion, one after the other: the end so far, and samples."""
+    if timing.path_shaper is None:
+        plain = sampling(sample_time)
+        sampled: SamplingState | None = None
+
+        def draw(profile: Profile, last: bool) -> Iterator[Drawn]:
+            nonlocal sampled
+            for now, command in plain(sampled, profile, last):
+                sampled = now
+                yield now.end_time, command
+
+        return draw
+    shaped = path_sampling(timing.path_shaper, sample_time)
+    state: PathShapingState | None = None
+
+    def draw_shaped(profile: Profile, last: bool) -> Iterator[Drawn]:
+        nonlocal state
+        for now, command in shaped(state, profile, last):
+            state = now
+            yield now.end_time, command
+
+    return draw_shaped
 
 
 def replaying(command: Trajectory, toolpath: Toolpath) -> Iterator[Block]:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cnc_shape.config.setup import Setup
+from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import LINEAR_DEFAULT, Machine
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
 from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.readers.trajectories import resample
+from cnc_shape.timing import PLAIN, Timing
 
 
 @dataclass(slots=True)
@@ -54,12 +56,18 @@ class OpenMotion:
 
 @contextmanager
 def open_motion(
-    path: str, setup: Setup, options: ReadingOptions | None = None, planner: Machine | None = None
+    path: str,
+    setup: Setup,
+    options: ReadingOptions | None = None,
+    timings: Sequence[Timing] = (PLAIN,),
+    watched: Sequence[Timing] = (),
+    planner: Machine | None = None,
 ) -> Generator[OpenMotion]:
-    """Open a file and plan it as it is read; where it tells the time itself, replay it.
+    """Open a file and plan it as it is read, once for each timing; where it tells the time itself, replay it.
 
-    Tool lengths are the machine's where `options` have none. The planner keeps the limits of `planner`,
-    by default the machine's own.
+    Tool lengths are the machine's where `options` have none. A time trajectory cannot be path-shaped: that is
+    refused in `timings`, and left out of the `watched` ones. The planner keeps the limits of `planner`, by
+    default the machine's own.
 
     Raises
     ------
@@ -76,14 +84,26 @@ def open_motion(
         name = "stdin" if path == STANDARD_INPUT else Path(path).name
         motion = OpenMotion(name, opened.source, setup, opened.lines, iter(()))
         if opened.timed is not None:
+            _refuse_path_shaping(timings, opened.source)
             command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
             blocks = replaying(command, toolpath)
             motion.timed = True
         else:
+            every = tuple(dict.fromkeys((*timings, *watched)))
             chunks = _noted(opened.chunks, motion.notes)
-            blocks = moving(chunks, planner or setup.machine, setup.planning.path_tolerance, period)
+            machine = planner or setup.machine
+            blocks = moving(chunks, machine, setup.planning.path_tolerance, period, every)
         motion.blocks = _watched(blocks, motion)
         yield motion
+
+
+def _refuse_path_shaping(timings: Sequence[Timing], source: str) -> None:
+    if any(timing.path_shaper is not None for timing in timings):
+        raise InfeasibleError(
+            "a time trajectory has no time law of its own that path shaping could act on",
+            hint="use shaping: contour or axis, or give a path without times",
+            source=source,
+        )
 
 
 def digest(path: str) -> str:

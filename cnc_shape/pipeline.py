@@ -17,8 +17,9 @@ numbers do not depend on where it was cut.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, sqrt
+from typing import Protocol
 
 import numpy as np
 
@@ -26,15 +27,13 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
-from cnc_shape.errors import OptionError
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.machine import FirstOrderLag, Machine
 from cnc_shape.motion import Block
 from cnc_shape.recording import Outline, Recorder, Signals
-from cnc_shape.shapers import Shaper
-from cnc_shape.shapers.shaping import delays, shaping
+from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.simulation import SimulationState, simulating
-from cnc_shape.trajectory import Trajectory
+from cnc_shape.timing import PLAIN, Timing
 
 WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
 WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
@@ -44,11 +43,12 @@ SLOWEST_LOOP = 2.5  # s, time constant beyond which the window grows no more
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One row of the table: which shapers and which loop the motion goes through."""
+    """One row of the table: how the motion is timed and shaped, and which loop it goes through."""
 
     name: str
-    shapers: Mapping[str, Shaper]
+    shaping: CommandShaping
     control: Control
+    timing: Timing = PLAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +72,12 @@ def window(settling: float, longest: float, sample_time: float) -> tuple[int, in
     """
     back, ahead = WINDOW_BACK * settling + longest, WINDOW_AHEAD * settling + longest
     return ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1
+
+
+def settling_time(machine: Machine, control: Control) -> float:
+    """Time constant of the position loop, s; 0 where all drives are ideal."""
+    lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
+    return min(1.0 / control.position_gain, SLOWEST_LOOP) if lags else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,41 +118,12 @@ class Run:
         return next(signals for signals in self.signals if signals.case == case)
 
 
-def default_cases(setup: Setup) -> tuple[Case, ...]:
-    """Rows of a machine's table: unshaped, shaped, then one row more per configured term."""
-    alone = replace(setup.control, cross_coupling=None)
-    shapers = setup.acting_shapers
-    if not shapers:
-        cases = [Case("independent", {}, alone)]
-        last = "cross_coupled"
-    else:
-        cases = [Case("unshaped", {}, alone), Case("shaped", shapers, alone)]
-        last = "shaped+cross_coupled"
-    if setup.control.cross_coupling is not None:
-        cases.append(Case(last, shapers, setup.control))
-    return tuple(cases)
+class Observer(Protocol):
+    """What is fed every block of a motion."""
 
-
-def pick_cases(setup: Setup, names: Sequence[str]) -> tuple[Case, ...]:
-    """Rows that the user names, in his order.
-
-    Raises
-    ------
-    OptionError
-        A name that this machine has no case for.
-    """
-    known = {case.name: case for case in default_cases(setup)}
-    if setup.shapers:
-        alone = replace(setup.control, cross_coupling=None)
-        bare = replace(alone, feedforward=None)
-        known["axis_shaped"] = Case("axis_shaped", setup.shapers, alone)
-        known["shaped-feedforward"] = Case("shaped-feedforward", setup.shapers, bare)
-    for name in names:
-        if name in ("contour_shaped", "path_shaped"):
-            raise OptionError(f"the case {name} is not built yet", hint="axis_shaped is")
-        if name not in known:
-            raise OptionError(f"this machine has no case called {name!r}", hint="it has " + ", ".join(known))
-    return tuple(known[name] for name in names)
+    def advance(self, block: Block) -> None:
+        """Take the next block."""
+        ...
 
 
 class Trial:
@@ -156,14 +133,13 @@ class Trial:
         self.case = case
         self._machine = machine
         self.recorder = recorder
-        self._shape = shaping(case.shapers, case.control.sample_time)
+        period, axes = case.control.sample_time, tuple(axis.name for axis in machine.axes)
+        self._shape = command_shaping(case.shaping, axes, period)
         self._simulate = simulating(machine, case.control)
-        axes = tuple(axis.name for axis in machine.axes)
-        self._longest = delays(case.shapers, axes, case.control.sample_time).longest
-        lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
-        settling = min(1.0 / case.control.position_gain, SLOWEST_LOOP) if lags else 0.0
-        self._measure = measuring(*window(settling, self._longest, case.control.sample_time), WINDOW_MARGIN)
-        self._shaped: Trajectory | None = None
+        self._longer = case.shaping.longer(axes, period)
+        reach = window(settling_time(machine, case.control), self._longer, period)
+        self._measure = measuring(*reach, WINDOW_MARGIN)
+        self._shaped: CommandState | None = None
         self._simulated: SimulationState | None = None
         self._measured: MeasuringState | None = None
         self._tallies = [Tally(), Tally(), Tally()]  # of the command, the drives, the tool
@@ -172,9 +148,11 @@ class Trial:
         self._cycle_time = 0.0
 
     def advance(self, block: Block) -> None:
-        """Run the next block through the case."""
+        """Run the next block through the case, if it is of the case's own timing."""
+        if block.timing is not None and block.timing != self.case.timing:
+            return
         command = block.command
-        if self.case.shapers:
+        if self.case.shaping.acts:
             self._shaped, command = self._shape(self._shaped, command, block.last)
         self._simulated, response = self._simulate(self._simulated, command, block.last)
         add_squares(response.following_error, self._following)
@@ -187,7 +165,7 @@ class Trial:
         if self.recorder is not None:
             self.recorder.add(response, errors)
         if block.last:
-            self._cycle_time = block.cycle_time + self._longest
+            self._cycle_time = block.cycle_time + self._longer
 
     def signals(self) -> Signals | None:
         """Samples kept for a report, if any were to be; call it after the last block."""
@@ -217,13 +195,14 @@ def run(
     *,
     record: bool = False,
     all_signals: bool = False,
+    observers: Sequence[Observer] = (),
 ) -> Run:
     """Send a motion through every case and measure it.
 
     Parameters
     ----------
     blocks
-        The unshaped motion, from `motion.moving` or `motion.replaying`.
+        The motion, from `motion.moving` with the `timings` of the cases, or from `motion.replaying`.
     setup
         The machine.
     cases
@@ -234,6 +213,8 @@ def run(
         Keep the signals for a report.
     all_signals
         Keep every sample of them, however many there are.
+    observers
+        Who else sees every block.
 
     Raises
     ------
@@ -246,6 +227,7 @@ def run(
     outline = Outline()
     samples, cycle_time = 0, 0.0
     for block in blocks:
+        unshaped = block.timing is None or block.timing == PLAIN
         if not trials:
             axes = block.command.axes
             machine = setup.machine.with_axes(axes)
@@ -255,12 +237,13 @@ def run(
                 for case in cases
             ]
             trials = [Trial(case, machine, recorder) for case, recorder in zip(cases, recorders, strict=True)]
-        if record and block.toolpath is not None:
+        if record and unshaped and block.toolpath is not None:
             outline.add(block.toolpath)
-        for trial in trials:
-            trial.advance(block)
-        samples += len(block.command)
-        cycle_time = block.cycle_time
+        for watcher in (*trials, *observers):
+            watcher.advance(block)
+        if unshaped:
+            samples += len(block.command)
+            cycle_time = block.cycle_time
     summary = Summary(
         program, setup.machine.name, cycle_time, setup.control.sample_time, samples,
         tuple(trial.summary() for trial in trials),

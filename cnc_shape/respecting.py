@@ -57,17 +57,18 @@ def respect_limits(path: str, setup: Setup, options: ReadingOptions) -> Respect:
             "--respect-limits reads the program more than once, and standard input is gone after the first",
             hint="write the program to a file",
         )
-    machine = setup.machine
+    kind = setup.planning.shaping
+    machine, shaping = setup.machine, setup.command_shaping(kind)
     cycle_time: float | None = None
     caution, worst = CAUTION, 0.0
     for plans in range(1, PLANS + 1):
-        with open_motion(path, setup, options, machine) as motion:
+        with open_motion(path, setup, options, [setup.timing(kind)], planner=machine) as motion:
             if motion.timed:
                 raise OptionError(
                     f"{path} tells its own times: there is nothing to plan within lower limits",
                     hint="leave --respect-limits out, or give way-points without time_s",
                 )
-            work = Application(motion.blocks, setup.machine, setup.acting_shapers, setup.control.sample_time)
+            work = Application(motion.blocks, setup.machine, shaping, setup.control.sample_time)
             for _ in work.blocks():
                 pass
             done = work.summary()

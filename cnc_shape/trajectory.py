@@ -44,6 +44,21 @@ class Trajectory:
             self.acceleration[rows],
         )
 
+    def resting(self, row: int, samples: int) -> Trajectory:
+        """A command that rests for `samples` where this one is at `row`."""
+        position = self.position[row]
+        still = frozen(np.zeros((samples, position.size)))
+        place = frozen(np.full(samples, self.arc_length[row]))
+        return Trajectory(self.axes, self.sample_time, place, frozen(still + position), still, still)
+
+    def late_arc_length(self, first: int, delay: float) -> FloatArray:
+        """The place from sample `first` on, `delay` samples ago, linear between samples."""
+        whole = int(np.floor(delay))
+        share = delay - whole
+        right = self.arc_length[first - whole : len(self) - whole]
+        left = self.arc_length[first - whole - 1 : len(self) - whole - 1]
+        return right + share * (left - right)
+
     def summary(self) -> str:
         """Length in time and place, in one line."""
         axes = ", ".join(axis.upper() for axis in self.axes)

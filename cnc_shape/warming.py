@@ -12,8 +12,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from cnc_shape.applying import Application
 from cnc_shape.arrays import FloatArray, IntArray
+from cnc_shape.cases import default_cases, timings
 from cnc_shape.census import count
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
@@ -21,10 +24,12 @@ from cnc_shape.config.setup import Setup
 from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.kernels import compiled_count
 from cnc_shape.opening import open_motion
-from cnc_shape.pipeline import default_cases, run
+from cnc_shape.pipeline import run
 from cnc_shape.readers import ReadingOptions, read_program, reading
 from cnc_shape.readers.source import COMPILED_FROM
 from cnc_shape.recording.extremes import BUCKETS
+from cnc_shape.shapers.discretisation import Interpolation
+from cnc_shape.shapers.live import LiveShaper, filters
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.writers.points import points_file, points_of
@@ -79,6 +84,7 @@ def warm() -> Iterator[int]:
                     yield compiled_count()
         _certify(Path(folder) / "lines.nc", machines[0])
         _thin(Path(folder) / "long.nc", machines[0])
+        _stream(machines[0])
         yield compiled_count()
 
 
@@ -95,13 +101,15 @@ def _check(path: Path, options: ReadingOptions) -> None:
 def _simulate(path: Path, setup: Setup, options: ReadingOptions) -> None:
     late = replace(setup, control=replace(setup.control, delay_samples=1))
     for variant in (setup, late):
-        with open_motion(str(path), variant, options) as motion:
-            run(motion.blocks, variant, default_cases(variant), motion.name, record=True)
+        cases = default_cases(variant)
+        with open_motion(str(path), variant, options, timings(cases)) as motion:
+            run(motion.blocks, variant, cases, motion.name, record=True)
 
 
 def _apply(path: Path, setup: Setup, options: ReadingOptions) -> None:
+    shaping = setup.command_shaping(setup.planning.shaping)
     with open_motion(str(path), setup, options) as motion:
-        work = Application(motion.blocks, setup.machine, setup.acting_shapers, setup.control.sample_time)
+        work = Application(motion.blocks, setup.machine, shaping, setup.control.sample_time)
         write_program(path.with_suffix(".shaped.nc"), work.blocks(), force=True)
         work.summary()
 
@@ -111,6 +119,12 @@ def _thin(path: Path, setup: Setup) -> None:
     path.write_text(LONG.format(seconds=SAMPLES * setup.control.sample_time))
     with open_motion(str(path), setup) as motion:
         run(motion.blocks, setup, default_cases(setup)[:1], motion.name, record=True)
+
+
+def _stream(setup: Setup) -> None:
+    sample_time = setup.control.sample_time
+    wanted = filters(setup.acting_shapers, ("x", "y"), sample_time, Interpolation.LINEAR, {})
+    LiveShaper(wanted).push(np.zeros(2))
 
 
 def _certify(path: Path, setup: Setup) -> None:

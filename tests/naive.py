@@ -423,6 +423,67 @@ def ideal_tool(command, axis):
     return tool
 
 
+# contour and path shaping
+
+
+def smoothed_offset(velocity, acceleration, gain, sample_time, width, at):
+    """Value at time `at` of the offset normal to the motion, smoothed by a triangle of half width `width`.
+
+    Samples from t = 0 are joined by straight lines; before and after them there is nothing. Quadrature.
+    """
+    offsets = []
+    for v, a in zip(velocity, acceleration, strict=True):
+        pushed = gain * a
+        along = v if np.linalg.norm(v) > 1e-9 else a
+        size = np.linalg.norm(along)
+        unit = along / size if size > 0 else 0.0 * along
+        offsets.append(pushed - unit * (unit @ pushed))
+    offsets = np.array(offsets)
+    known = np.arange(len(offsets)) * sample_time
+    borders = np.unique(np.concatenate([known, [at - width, at, at + width]]))
+    borders = borders[(borders >= at - width) & (borders <= at + width)]
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    total = np.zeros(offsets.shape[1])
+    for low, high in pairwise(borders):
+        for node, weight in zip(nodes, weights, strict=True):
+            t = (low + high) / 2 + node * (high - low) / 2
+            value = np.array([np.interp(t, known, column) for column in offsets.T])
+            total += weight * (high - low) / 2 * value * (1 - abs(t - at) / width) / width
+    return total
+
+
+def along_path(travelled, speed, acceleration, start, length, rows):
+    """Axes of a path of cubic cells at values of its parameter, by the chain rule; it rests beyond its ends."""
+    out = []
+    for u, v, a in zip(travelled, speed, acceleration, strict=True):
+        k = max(max((i for i in range(len(start)) if start[i] <= u), default=0), 0)
+        s = u - start[k]
+        if not 0 <= s <= length[k]:
+            s, v, a = min(max(s, 0.0), length[k]), 0.0, 0.0
+        cubic = [np.polynomial.Polynomial(rows[k][:, i]) for i in range(rows.shape[2])]
+        position = [p(s) for p in cubic]
+        velocity = [p.deriv()(s) * v for p in cubic]
+        pushed = [p.deriv()(s) * a + p.deriv(2)(s) * v**2 for p in cubic]
+        out.append((position, velocity, pushed))
+    return tuple(np.array(values) for values in zip(*out, strict=True))
+
+
+# --- live shaping ---------------------------------------------------------------------------------
+
+
+def filtered(samples, weights):
+    """FIR filter of one axis, from rest at the first sample to rest at the last: the sum as it is written."""
+    longest = len(weights) - 1
+    out = []
+    for n in range(len(samples) + longest):
+        total = 0.0
+        for k, weight in enumerate(weights):
+            if weight != 0.0:
+                total += weight * samples[min(max(n - k, 0), len(samples) - 1)]
+        out.append(total)
+    return np.array(out)
+
+
 # --- straight pieces of a sampled motion ------------------------------------------------------------
 
 

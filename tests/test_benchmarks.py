@@ -13,7 +13,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from benchmarks import klipper, programs, table
+from benchmarks import intervals, klipper, programs, table
 from benchmarks.measuring import ROOT, Kind, Row, not_built, parse
 from cnc_shape.config import load_machine
 from cnc_shape.config.bundled import bundled
@@ -245,3 +245,10 @@ def test_the_document_has_its_markers_and_every_script_is_run():
         if "report(" in path.read_text(encoding="utf-8") and path.stem != "measuring"
     }
     assert scripts == set(table.SCRIPTS)
+
+
+def test_the_document_on_live_streams_holds_the_table_that_is_produced():
+    document = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    assert table.placed(document, intervals.table()) == document, (
+        "python benchmarks/intervals.py --write docs/live.md"
+    )

@@ -110,7 +110,7 @@ def test_every_key_of_the_contract_arrives() -> None:
 def test_what_a_file_leaves_out_has_the_defaults_of_the_contract() -> None:
     setup = parse(SMALL)
     assert setup == Setup(Machine("machine", (Axis("x", Limits(100.0, 1000.0)),)))
-    assert setup.planning == Planning(path_tolerance=0.01, shaping=Shaping.AXIS)
+    assert setup.planning == Planning(path_tolerance=0.01, shaping=Shaping.CONTOUR)
     assert setup.control == Control(sample_time=1e-3, position_gain=20.0)
     assert setup.machine.axes[0].drive == IdealDrive()
     assert setup.machine.axes[0].limits.travel == (-inf, inf)
@@ -278,7 +278,7 @@ def test_an_error_prints_as_one_line_with_its_place() -> None:
         ("shaper: {type: zv, of: zvd}", 24, "axes.x.shaper.of: unknown key"),
         ("shaper: {type: cascade, cascade: 1}", 29, "axes.x.shaper.cascade: unknown key"),
         ("shaper: {type: cascade, of: cascade}", 33, "axes.x.shaper.of: must be"),
-        ("shaper: {type: cascad}", 20, "axes.x.shaper.type: must be none or zv or zvd"),
+        ("shaper: {type: cascad}", 20, "axes.x.shaper.type: must be none, zv, zvd"),
         ("shaper: {type: impulses, times_s: [0, 1]}", 13, "axes.x.shaper: amplitudes is missing"),
         ("shaper: {type: impulses, times_s: [], amplitudes: []}", 39, "needs at least 1 values, not 0"),
         ("shaper: {type: impulses, times_s: [0, 1], amplitudes: [1]}", 13, "as many times as amplitudes"),
@@ -311,9 +311,9 @@ def test_what_an_axis_cannot_be_is_refused_at_its_place(text: str, column: int, 
         (SMALL + "disturbances: []", (2, 1), "disturbances: not built yet"),
         (SMALL + "kinematics: {type: corexy}", (2, 14), "kinematics.type: corexy is not built yet"),
         (SMALL + "kinematics: {type: polar}", (2, 20), "kinematics.type: must be cartesian, not"),
-        (SMALL + "planning: {shaping: contour}", (2, 12), "planning.shaping: contour is not built yet"),
-        (SMALL + "planning: {shaping: axes}", (2, 21), "planning.shaping: must be axis or none"),
-        (SMALL + "planning: {tool_tolerance_mm: 1}", (2, 12), "planning.tool_tolerance_mm: not built yet"),
+        (SMALL + "planning: {shaping: axes}", (2, 21), "planning.shaping: must be contour, axis, path or none"),
+        (SMALL + "planning: {chord_error_mm: 1}", (2, 12), "planning.chord_error_mm: not built yet"),
+        (SMALL + "planning: {tool_tolerance_mm: 0}", (2, 31), "planning.tool_tolerance_mm: must be at least"),
         (SMALL + "planning: {path_tolerance_mm: 0}", (2, 31), "must be at least 1e-06, not 0"),
         (SMALL + "control: {sample_time_s: 0}", (2, 26), "must be at least 1e-06, not 0"),
         (SMALL + "control: {sample_time_s: 1e-300}", (2, 26), "must be at least 1e-06"),

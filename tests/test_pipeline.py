@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, line, program
 
 from cnc_shape.api import simulate_program
+from cnc_shape.cases import default_cases, pick_cases, timings
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Planning, Shaping
@@ -21,10 +22,11 @@ from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import moving, replaying
 from cnc_shape.opening import open_motion
-from cnc_shape.pipeline import default_cases, pick_cases, run
+from cnc_shape.pipeline import run
 from cnc_shape.readers import ReadingOptions, read_program, read_trajectory
 from cnc_shape.recording import Signals
 from cnc_shape.report.table import summary_json
+from cnc_shape.shapers.contour_compensation import half_width
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 
@@ -33,6 +35,7 @@ SAMPLES = {
     "bracket.nc": "xy_stage.yaml",
     "pocket.nc": "mill_three_axis.yaml",
     "clover.csv": "xy_stage.yaml",
+    "probing.nc": "cmm.yaml",
     "circle_time.csv": "xy_stage.yaml",
 }
 PROGRAMS = [name for name in SAMPLES if name != "circle_time.csv"]
@@ -100,7 +103,8 @@ def test_tiny_segments_with_corners_on_the_borders_of_chunks(size):
     cases = default_cases(setup)
 
     def through(chunks):
-        return run(moving(chunks, setup.machine, 0.01, 1e-3), setup, cases, "tiny", record=True)
+        blocks = moving(chunks, setup.machine, 0.01, 1e-3, timings(cases))
+        return run(blocks, setup, cases, "tiny", record=True)
 
     same(through(cut(whole, size)), through([whole]))
 
@@ -146,7 +150,9 @@ def test_shaping_pays_on_the_bundled_sample_and_has_its_price():
     assert max(shaped.residual_vibration.values()) < 2e-3 * max(unshaped.residual_vibration.values())
     assert shaped.command.max > 5 * unshaped.command.max  # the price: corners of the command are rounded
     duration = max(shaper.duration for shaper in setup_of("bracket.nc").shapers.values())
-    assert_allclose(shaped.cycle_time - unshaped.cycle_time, duration, rtol=1e-9)
+    gains = pick_cases(setup_of("bracket.nc"), ["shaped"])[0].shaping.gains(("x", "y", "z"))
+    longer = duration + 2.0 * half_width(gains)  # the shaper's impulses, and the compensation's window
+    assert_allclose(shaped.cycle_time - unshaped.cycle_time, longer, rtol=1e-9)
 
 
 def test_cases_of_a_machine_with_and_without_shapers():
@@ -160,8 +166,9 @@ def test_cases_of_a_machine_with_and_without_shapers():
     plain, bare = pick_cases(setup, ["axis_shaped", "shaped-feedforward"])
     assert plain.control.feedforward is not None
     assert bare.control.feedforward is None
-    with pytest.raises(OptionError, match="not built yet"):
-        pick_cases(setup, ["contour_shaped"])
+    picked = pick_cases(setup, ["contour_shaped", "path_shaped"])
+    assert picked[0].shaping.structure is not None
+    assert picked[1].timing.path_shaper is not None
     with pytest.raises(OptionError, match="no case called 'shape'"):
         pick_cases(setup, ["shape"])
 
@@ -177,8 +184,9 @@ def test_a_replayed_trajectory_bypasses_the_planner():
 def test_an_axis_the_machine_lacks_is_named():
     setup = load_machine(bundled("xy_stage.yaml"))
     bare = replace(setup, machine=replace(setup.machine, axes=setup.machine.axes[:1]))
-    with open_motion(str(bundled("bracket.nc")), bare) as motion:
-        run(motion.blocks, bare, default_cases(bare), motion.name)
+    cases = default_cases(bare)
+    with open_motion(str(bundled("bracket.nc")), bare, None, timings(cases)) as motion:
+        run(motion.blocks, bare, cases, motion.name)
     (warning,) = [text for text in motion.warnings() if "lacks" in text]
     assert "lacks Y, which" in warning
 

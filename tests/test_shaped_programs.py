@@ -324,8 +324,9 @@ def test_real_programs_come_back(shared, tmp_path, name):
     text = (shared / "data" / "gcode" / "programs" / name).read_text(errors="replace")
     head.write_text("\n".join(text.splitlines()[:300]) + "\n")
     setup = load_machine(bundled("xy_stage.yaml"))
-    with open_motion(str(head), setup) as motion:
-        work = Application(motion.blocks, setup.machine, setup.acting_shapers, T)
+    kind = setup.planning.shaping
+    with open_motion(str(head), setup, timings=[setup.timing(kind)]) as motion:
+        work = Application(motion.blocks, setup.machine, setup.command_shaping(kind), T)
         blocks = list(work.blocks())
     command = join_trajectories(blocks)
     done = write_program(tmp_path / "out.nc", blocks)

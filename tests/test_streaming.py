@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from test_pipeline import cut
 
+from cnc_shape.cases import default_cases
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.motion import moving
-from cnc_shape.pipeline import Trial, default_cases
+from cnc_shape.pipeline import Trial
 from cnc_shape.program import concatenate
 from cnc_shape.readers import ReadingOptions, read_chunks
 
@@ -46,11 +47,11 @@ class Fingerprint:
         return {name: digest.hexdigest() for name, digest in self._hashes.items()}
 
 
-def fingerprint(chunks, setup):
+def fingerprint(chunks, setup, case):
     """Hashes of all that one case makes of a program, and its summary."""
-    case = default_cases(setup)[-1]
     trial = mark = None
-    for block in moving(chunks, setup.machine, setup.planning.path_tolerance, setup.control.sample_time):
+    planning, period = setup.planning, setup.control.sample_time
+    for block in moving(chunks, setup.machine, planning.path_tolerance, period, [case.timing]):
         if trial is None or mark is None:
             mark = Fingerprint()
             trial = Trial(case, setup.machine.with_axes(block.command.axes), mark)
@@ -63,9 +64,10 @@ def test_real_programs_at_awkward_chunk_sizes(shared, name):
     path = shared / "data" / "gcode" / "programs" / name
     setup = load_machine(bundled("xy_stage.yaml"))
     (program,) = islice(read_chunks(path, ReadingOptions(rows=MOVES)), 1)
-    whole = fingerprint([program], setup)
+    case = default_cases(setup)[-1]
+    whole = fingerprint([program], setup, case)
     for size in (61, 997):
-        assert fingerprint(cut(program, size), setup) == whole
+        assert fingerprint(cut(program, size), setup, case) == whole
 
 
 @pytest.mark.parametrize("rows", [7, 500])

@@ -25,9 +25,12 @@ TWINS = {
     "kernels/hats.py": ("naive.hat_widths", "test_smoothing.py"),
     "kernels/knots.py": ("naive.knots", "test_shaped_programs.py"),
     "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
+    "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),
     "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python
     "kernels/plain_rows.py": ("read_rows", "test_plain_rows.py"),  # the reader in Python
     "kernels/polyline.py": ("naive.tangent_polygon", "test_polyline.py"),
+    "kernels/progress.py": ("naive.along_path", "test_path_shaping.py"),
+    "kernels/ring.py": ("naive.filtered", "test_live.py"),
     "kernels/sampling.py": ("naive.samples", "test_trajectory.py"),
     "kernels/speed_limits.py": ("naive.speed_limits", "test_feedrate.py"),
     "kernels/sums.py": ("naive.squares", "test_sums.py"),

@@ -26,9 +26,12 @@ from cnc_shape.cli.doctor import doctor
 from cnc_shape.cli.errors import WRONG_INPUT, Terminated, guarded
 from cnc_shape.cli.init import init
 from cnc_shape.cli.output import print_text
+from cnc_shape.cli.reproduce import reproduce
 from cnc_shape.cli.simulate import simulate
 
-COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (simulate, apply, design, check, init, doctor)
+COMMANDS: Final[tuple[Callable[..., int | None], ...]] = (
+    simulate, apply, design, check, reproduce, init, doctor,
+)  # fmt: skip
 
 GARBAGE_THRESHOLD: Final = 20_000  # objects made before the first generation is searched
 

@@ -115,6 +115,7 @@ def remarks(name: str, setup: Setup) -> list[str]:
     return [
         f"shaped motion of {name}, by cnc-shape {__version__}",
         f"machine: {setup.machine.name}",
+        f"shaping: {setup.planning.shaping.value}",
         *_shaper_lines(setup.acting_shapers, setup),
         "motion alone: no spindle, coolant, tool change or other machine function of the original",
         "positions of the control point in mm and degrees, as read with G54 at the machine's origin",

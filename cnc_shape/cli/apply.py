@@ -18,7 +18,10 @@ PROGRAMS = (".nc", ".ngc", ".gcode")
 
 
 def apply(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="G-code or CSV; - for standard input.")],
+    file: Annotated[
+        str | None,
+        typer.Argument(metavar="FILE", help="G-code or CSV; - for standard input.", show_default=False),
+    ] = None,
     output: Annotated[
         str | None,
         typer.Option(
@@ -43,10 +46,29 @@ def apply(
     path: PathStyle = "polyline",
     closed: Closed = False,
     force: Force = False,
+    stream: Annotated[
+        bool, typer.Option("--stream", help="Shape CSV samples line by line, from standard input to output.")
+    ] = False,
+    interpolation: Annotated[
+        str | None,
+        typer.Option(
+            help="With --stream, impulses between samples: exact, linear, cubic or rounded.",
+            show_default="exact",
+        ),
+    ] = None,
+    sample_time_s: Annotated[
+        float | None,
+        typer.Option(help="With --stream, interval of the samples.", show_default="as their times say"),
+    ] = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Shape a program's axis commands; write them as a program, or as samples at the servo period."""
+    if stream:
+        from cnc_shape.cli.streaming import stream_samples
+
+        stream_samples(file, output, machine, interpolation, sample_time_s, json=json, quiet=quiet)
+        return
     from cnc_shape.applying import Application
     from cnc_shape.cli import applied
     from cnc_shape.cli.output import print_json, print_text, warn
@@ -57,6 +79,12 @@ def apply(
     from cnc_shape.opening import open_motion
     from cnc_shape.respecting import respect_limits as find_limits
 
+    if file is None:
+        raise OptionError("missing argument 'FILE'", hint="name a program, or - for standard input")
+    if interpolation is not None or sample_time_s is not None:
+        raise OptionError(
+            "--interpolation and --sample-time-s are for live samples", hint="give --stream, too"
+        )
     if json and output == "-":
         raise OptionError("--json and -o - both want standard output", hint="name a file for the samples")
     target = _target(file, output, force=force)
@@ -69,12 +97,14 @@ def apply(
     if respect_limits:
         with progress("planning", None, quiet=quiet or json):
             respect = find_limits(file, setup, options)
+    kind = setup.planning.shaping
+    planner = respect.machine if respect else None
     with (
-        open_motion(file, setup, options, respect.machine if respect else None) as motion,
+        open_motion(file, setup, options, [setup.timing(kind)], planner=planner) as motion,
         progress("applying", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)
-        work = Application(blocks, setup.machine, setup.acting_shapers, setup.control.sample_time)
+        work = Application(blocks, setup.machine, setup.command_shaping(kind), setup.control.sample_time)
         remarks = applied.remarks(motion.name, setup) if as_program else []
         written = _write(work, target, tolerance_um, remarks, force=force)
         done = work.summary()

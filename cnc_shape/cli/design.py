@@ -83,6 +83,21 @@ def design(
     sensitivity: Annotated[
         bool, typer.Option("--sensitivity", help="JSON: V over frequency and damping, too.")
     ] = False,
+    axis: Annotated[
+        str | None, typer.Option(help="Only this axis of the machine; or the one the frequencies are of.")
+    ] = None,
+    emit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Print the text that hands the shaper to a controller: rrf, rrf-3.4, klipper, "
+            "klipper-custom, marlin, marlin-ft, c, yaml or json. Without SHAPER the machine's own shapers.",
+        ),
+    ] = None,
+    sample_time_s: Annotated[
+        Number,
+        typer.Option(help="--emit c: sample time of the taps; the machine's, or 0.001.", show_default=False),
+    ] = None,
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the shaper, or the comparison: .png, .svg, .pdf.")
     ] = None,
@@ -94,15 +109,13 @@ def design(
 
     Shapers: zv zvd zvdd zvddd umzv mzv ei 2hump_ei 3hump_ei virtual_mode sd; for several modes cascade,
     multi_mode and optimal; as firmwares compute them klipper_ei klipper_2hump_ei klipper_3hump_ei fitted_ei
-    duet_ei2 duet_ei3; and impulses of your own.
+    duet_ei2 duet_ei3; and impulses of your own. --emit hands the result to a controller.
     """
-    from cnc_shape.cli import designing
+    from cnc_shape.cli import designing, emitting
     from cnc_shape.cli.subjects import subjects_of
 
-    subjects, corner = subjects_of(
-        frequency_hz or [], damping_ratio or [], frequency_uncertainty or [], damping_uncertainty or [],
-        machine, corner_speed_mm_s, corner_tolerance_mm,
-    )  # fmt: skip
+    target = None if emit is None else emitting.target_of(emit)
+    sample_time = emitting.sample_time_of(sample_time_s, machine, target)
     options: dict[str, object] = {
         "duration_s": duration_s, "duration_periods": duration_periods, "max_amplitude": max_amplitude,
         "virtual_frequency_hz": virtual_frequency_hz, "min_gap_s": min_gap_s, "metric": metric,
@@ -113,9 +126,29 @@ def design(
     }  # fmt: skip
     given = {key: value for key, value in options.items() if value is not None}
     drawing = designing.drawing_at(plot, force=force)
+    if shaper is None and target is not None:
+        if frequency_hz or damping_ratio or frequency_uncertainty or damping_uncertainty or plot is not None:
+            raise emitting.no_shaper()
+        designing.refuse_options(given)
+        emitting.hand_over_configured(machine, axis, target, sample_time_s, json=json)
+        return
+    subjects, corner = subjects_of(
+        frequency_hz or [], damping_ratio or [], frequency_uncertainty or [], damping_uncertainty or [],
+        machine, corner_speed_mm_s, corner_tolerance_mm, axis,
+    )  # fmt: skip
     if shaper is None:
         designing.compare_all(
             subjects, given, corner, drawing, quiet=quiet, json=json, sensitivity=sensitivity
         )
+        return
+    designs = designing.design_one(subjects, shaper, given)
+    result = (
+        None
+        if target is None
+        else emitting.handed_over(designs, target, corner, sample_time, sensitivity=sensitivity)
+    )
+    drawing(lambda: designing.design_figure(designs))
+    if result is None:
+        designing.show(designs, corner, json=json, sensitivity=sensitivity)
     else:
-        designing.design_one(subjects, shaper, given, corner, drawing, json=json, sensitivity=sensitivity)
+        emitting.show(result, json=json)

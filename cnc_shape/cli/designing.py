@@ -57,17 +57,8 @@ def drawing_at(plot: str | None, *, force: bool) -> Draw:
     return draw
 
 
-def design_one(
-    subjects: Sequence[Subject],
-    name: str,
-    given: Mapping[str, object],
-    corner: Corner,
-    draw: Draw,
-    *,
-    json: bool,
-    sensitivity: bool,
-) -> None:
-    """Design the shaper called `name` for every subject and show it.
+def design_one(subjects: Sequence[Subject], name: str, given: Mapping[str, object]) -> list[Design]:
+    """Design the shaper called `name` for every subject.
 
     Raises
     ------
@@ -77,21 +68,29 @@ def design_one(
         No shaper keeps to the bounds that were given.
     """
     choice = _choice(name, given)
-    tolerance = _tolerance(given)
-    designs = [_designed(subject, choice, tolerance) for subject in subjects]
-    draw(lambda: _design_figure(designs))
+    tolerance = tolerance_of(given)
+    return [_designed(subject, choice, tolerance) for subject in subjects]
+
+
+def show(designs: Sequence[Design], corner: Corner, *, json: bool, sensitivity: bool) -> None:
+    """Print designs, as JSON or as text."""
     if json:
-        rows = [design_json(d, choice.options, corner, sensitivity=sensitivity) for d in designs]
-        print_json("design", {"designs": rows})
+        print_json("design", designs_json(designs, corner, sensitivity=sensitivity))
         return
     for found in designs:
-        print_text(design_text(found, choice.options, corner))
+        print_text(design_text(found, found.options, corner))
 
 
-def _design_figure(designs: Sequence[Design]) -> Figure:
-    from cnc_shape.report.design_figures import design_figure
+def designs_json(designs: Sequence[Design], corner: Corner, *, sensitivity: bool) -> dict[str, Any]:
+    """The result of `design` for one shaper; the designs' options are those given, by their keys."""
+    return {"designs": [design_json(one, one.options, corner, sensitivity=sensitivity) for one in designs]}
 
-    return design_figure(designs)
+
+def design_figure(designs: Sequence[Design]) -> Figure:
+    """Draw the designs."""
+    from cnc_shape.report import design_figures
+
+    return design_figures.design_figure(designs)
 
 
 def _choice(name: str, given: Mapping[str, object]) -> ShaperChoice:
@@ -133,7 +132,8 @@ def _option(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
-def _tolerance(given: Mapping[str, object]) -> float:
+def tolerance_of(given: Mapping[str, object]) -> float:
+    """V that every band is told for."""
     value = given.get(TOLERANCE, DEFAULT_VIBRATION_TOLERANCE)
     assert isinstance(value, float)
     return value
@@ -180,14 +180,12 @@ def compare_all(
     """
     from cnc_shape.cli.progress import progress
 
-    for key in given:
-        if key != TOLERANCE:
-            raise OptionError(f"{_option(key)} is an option of a shaper", hint="name the shaper, too")
+    refuse_options(given)
     found: dict[tuple[Mode, ...], Comparison] = {}
     distinct = dict.fromkeys(subject.modes for subject in subjects)
     with progress("comparing", float(len(distinct)), quiet=quiet or json) as advance:
         for modes in distinct:
-            found[modes] = compare(modes, _tolerance(given), advance)
+            found[modes] = compare(modes, tolerance_of(given), advance)
     draw(lambda: _pareto_figure(subjects, found))
     if json:
         print_json("design", _comparison_json(subjects, found, corner, sensitivity=sensitivity))
@@ -202,6 +200,19 @@ def compare_all(
         titles = _titles(comparison)
         console.print(comparison_table(comparison, titles, names, corner, console.width))
         console.print(comparison_words(comparison, titles), soft_wrap=True, markup=False, highlight=False)
+
+
+def refuse_options(given: Mapping[str, object]) -> None:
+    """Refuse options of a shaper where none is named.
+
+    Raises
+    ------
+    OptionError
+        An option of one shaper.
+    """
+    for key in given:
+        if key != TOLERANCE:
+            raise OptionError(f"{_option(key)} is an option of a shaper", hint="name the shaper, too")
 
 
 def _options(found: Design) -> dict[str, object]:

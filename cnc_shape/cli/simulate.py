@@ -52,6 +52,7 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Simulate a program: motion, shaping, servo, structure; print its contour error case by case."""
+    from cnc_shape.cases import default_cases, pick_cases, timings
     from cnc_shape.cli.errors import DONE, GATE_FAILED
     from cnc_shape.cli.gate import parse_gate
     from cnc_shape.cli.output import print_error, print_json, warn
@@ -60,7 +61,7 @@ def simulate(
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.opening import open_motion
-    from cnc_shape.pipeline import default_cases, pick_cases, run
+    from cnc_shape.pipeline import run
     from cnc_shape.report.table import summary_json
 
     gates = [parse_gate(text) for text in fail_on or []]
@@ -76,7 +77,7 @@ def simulate(
     source = file if file is not None else str(bundled(SAMPLE))
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
     with (
-        open_motion(source, setup, options) as motion,
+        open_motion(source, setup, options, timings(picked)) as motion,
         progress("simulating", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)

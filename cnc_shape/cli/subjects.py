@@ -8,8 +8,10 @@ from math import isfinite
 
 from cnc_shape.errors import OptionError
 from cnc_shape.modes import Mode
+from cnc_shape.program import ROTARY, XYZ
 from cnc_shape.report.shaper_sheet import Corner
 
+AXES = (*XYZ, *ROTARY)
 CORNER_TOLERANCE = 0.05  # mm, where no machine says how exact its corners are
 
 
@@ -29,13 +31,16 @@ def subjects_of(
     machine: str | None,
     corner_speed: float,
     corner_tolerance: float | None,
+    axis: str | None = None,
 ) -> tuple[tuple[Subject, ...], Corner]:
     """The modes to design for, and the corner to tell about: as given, else those of the machine file.
+
+    With `axis` just that one of the machine, or the given modes as its own.
 
     Raises
     ------
     OptionError
-        Lists of unlike length, no mode, or a corner that is none.
+        Lists of unlike length, no mode, no such axis, or a corner that is none.
     ConfigError
         A machine file that cannot be read.
     """
@@ -51,13 +56,15 @@ def subjects_of(
             )
         ]
         modes = tuple(Mode(f, z, share, u, w) for f, z, u, w in zip(frequencies, *columns, strict=True))
-        subjects: tuple[Subject, ...] = (Subject(None, modes),)
+        if axis is not None:
+            check_axis(axis, AXES)
+        subjects: tuple[Subject, ...] = (Subject(axis, modes),)
     else:
         if dampings or frequency_uncertainties or damping_uncertainties:
             raise OptionError(
                 "damping and uncertainty belong to a frequency", hint="give --frequency-hz, too"
             )
-        subjects, tolerance = _machine_subjects(machine)
+        subjects, tolerance = _machine_subjects(machine, axis)
     corner = Corner(corner_speed, tolerance if corner_tolerance is None else corner_tolerance)
     for option, value in (("speed", corner.speed), ("tolerance", corner.tolerance)):
         if not (isfinite(value) and value > 0.0):
@@ -81,7 +88,19 @@ def _per_mode(values: Sequence[float], count: int, option: str) -> Sequence[floa
     return values
 
 
-def _machine_subjects(machine: str | None) -> tuple[tuple[Subject, ...], float]:
+def check_axis(axis: str, known: Sequence[str]) -> None:
+    """Refuse an axis that is none of `known`.
+
+    Raises
+    ------
+    OptionError
+        It is none of them.
+    """
+    if axis not in known:
+        raise OptionError(f"--axis is {', '.join(known)}, not {axis!r}", hint="name one of them")
+
+
+def _machine_subjects(machine: str | None, axis: str | None) -> tuple[tuple[Subject, ...], float]:
     from cnc_shape.config.machine_file import load_machine
 
     setup = load_machine(machine)
@@ -91,4 +110,7 @@ def _machine_subjects(machine: str | None) -> tuple[tuple[Subject, ...], float]:
             f"{setup.source} has no modes",
             hint="give an axis modes: [{frequency_hz: 30, damping_ratio: 0.02}]",
         )
+    if axis is not None:
+        check_axis(axis, [subject.axis for subject in subjects if subject.axis is not None])
+        subjects = tuple(subject for subject in subjects if subject.axis == axis)
     return subjects, setup.planning.path_tolerance

@@ -115,7 +115,8 @@ def _word(path: Path, kind: str, value: object, context: Mapping[str, object]) -
     given = cast("Mapping[str, object]", value)["type"] if kind == "union_tag_invalid" else value
     if isinstance(given, str) and given in _TYPES_NOT_BUILT.get(owner, ()):
         return f"{given} is not built yet", "use " + " or ".join(words)
-    return f"must be {' or '.join(words)}, not {_shown(given)}", suggestion(str(given), words)
+    choice = " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
+    return f"must be {choice}, not {_shown(given)}", suggestion(str(given), words)
 
 
 def _shown(value: object) -> str:

@@ -6,7 +6,7 @@ from math import inf, isfinite, nextafter
 
 import yaml
 
-from cnc_shape.config.setup import Setup
+from cnc_shape.config.setup import Planning, Setup
 from cnc_shape.controllers import Control
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag
@@ -35,10 +35,7 @@ def dump_machine(setup: Setup) -> str:
         "name": setup.machine.name,
         "kinematics": {"type": "cartesian"},
         "axes": {axis.name: _axis(axis, setup) for axis in setup.machine.axes},
-        "planning": {
-            "path_tolerance_mm": setup.planning.path_tolerance,
-            "shaping": setup.planning.shaping.value,
-        },
+        "planning": _planning(setup.planning),
         "control": _control(setup.control),
     }
     if setup.tools:
@@ -54,6 +51,18 @@ def dump_machine(setup: Setup) -> str:
         allow_unicode=True,
         width=LINE_LENGTH,
     )
+
+
+def _planning(planning: Planning) -> dict[str, object]:
+    keys: dict[str, object] = {
+        "path_tolerance_mm": planning.path_tolerance,
+        "shaping": planning.shaping.value,
+        "stop_dwell_shaper_durations": planning.stop_dwell,
+        "align": planning.aligned,
+    }
+    if planning.tool_tolerance is not None:
+        keys["tool_tolerance_mm"] = planning.tool_tolerance
+    return keys
 
 
 def _axis(axis: Axis, setup: Setup) -> dict[str, object]:

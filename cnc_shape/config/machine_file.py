@@ -19,6 +19,7 @@ from cnc_shape.config.models import (
     LinearAxisModel,
     MachineModel,
     ModeModel,
+    PlanningModel,
     RotaryAxisModel,
 )
 from cnc_shape.config.setup import Planning, Setup, ShaperChoice, Shaping
@@ -100,7 +101,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     notes = (*_jerk_note(tree, axes), *_single_mode_notes(tree, machine, choices))
     setup = Setup(
         machine=machine,
-        planning=Planning(model.planning.path_tolerance_mm, Shaping(model.planning.shaping)),
+        planning=_planning(model.planning),
         control=_control(model.control),
         tools=_tools(source, tree, model),
         choices=choices,
@@ -229,6 +230,16 @@ def _control(model: ControlModel) -> Control:
         feedforward=feed
         and Feedforward(feed.velocity, feed.acceleration, feed.model_time_constant_s, feed.model_gain),
         cross_coupling=couple and CrossCoupling(couple.proportional_per_s),
+    )
+
+
+def _planning(model: PlanningModel) -> Planning:
+    return Planning(
+        path_tolerance=model.path_tolerance_mm,
+        shaping=Shaping(model.shaping),
+        stop_dwell=model.stop_dwell_shaper_durations,
+        aligned=model.align,
+        tool_tolerance=model.tool_tolerance_mm,
     )
 
 

@@ -9,22 +9,30 @@ from enum import Enum
 from cnc_shape.controllers import Control
 from cnc_shape.machine import Machine
 from cnc_shape.shapers import Shaper
+from cnc_shape.shapers.command_shaping import CommandShaping
+from cnc_shape.shapers.path_shaping import common_shaper
+from cnc_shape.timing import PLAIN, Timing
 from cnc_shape.tools import Tool
 
 
 class Shaping(Enum):
     """What the shapers of a machine act on."""
 
-    AXIS = "axis"  # every axis command goes through its own shaper
+    CONTOUR = "contour"  # axis commands, curves compensated so that the tool keeps the path
+    AXIS = "axis"  # axis commands, each through its own shaper
+    PATH = "path"  # the time law along the path
     NONE = "none"  # nothing is shaped, whatever shapers the axes have
 
 
 @dataclass(frozen=True, slots=True)
 class Planning:
-    """How motion is planned."""
+    """How motion is planned, and what the shapers act on."""
 
     path_tolerance: float = 0.01  # mm
-    shaping: Shaping = Shaping.AXIS
+    shaping: Shaping = Shaping.CONTOUR
+    stop_dwell: float = 0.5  # -, of the longest shaper: rest at every stop on the way
+    aligned: bool = True  # axis shaping: all axes late alike
+    tool_tolerance: float | None = None  # mm, contour error of the tool above which the motion slows down
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,4 +62,28 @@ class Setup:
     @property
     def acting_shapers(self) -> Mapping[str, Shaper]:
         """Shapers that `planning.shaping` lets act: those of the axes, or none."""
-        return self.shapers if self.planning.shaping is Shaping.AXIS else dict[str, Shaper]()
+        return dict[str, Shaper]() if self.planning.shaping is Shaping.NONE else self.shapers
+
+    def command_shaping(self, shaping: Shaping) -> CommandShaping:
+        """What happens to the axis commands under one kind of shaping."""
+        if not self.shapers or shaping in (Shaping.NONE, Shaping.PATH):
+            return CommandShaping()
+        if shaping is Shaping.AXIS:
+            return CommandShaping(self.shapers, self.planning.aligned)
+        return CommandShaping(
+            self.shapers, structure={axis.name: axis.modes for axis in self.machine.axes if axis.modes}
+        )
+
+    def timing(self, shaping: Shaping) -> Timing:
+        """How the motion is timed under one kind of shaping.
+
+        Raises
+        ------
+        OptionError
+            Shapers that cannot act on the path together.
+        """
+        if not self.shapers or shaping is Shaping.NONE:
+            return PLAIN
+        longest = max(shaper.duration for shaper in self.shapers.values())
+        path_shaper = common_shaper(self.shapers) if shaping is Shaping.PATH else None
+        return Timing(self.planning.stop_dwell * longest, path_shaper)

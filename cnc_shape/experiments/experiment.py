@@ -23,7 +23,7 @@ class Status(Enum):
 class Row:
     """One number of a paper beside ours."""
 
-    quantity: str  # what it is and where it stands: "eq 15, A1", "table 2, ZV, residual"
+    quantity: str  # what it is: "A1", "ZV, residual"; distinct within its table, whose title tells the place
     unit: str  # "-", "s", "mm", "%", ...
     published: float | None  # as printed; None: the paper gives no number
     ours: float

@@ -12,7 +12,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import ProgramError
 from cnc_shape.program import ROTARY, XYZ
-from cnc_shape.readers.source import Bytes, Source, as_bytes, blocks, line_at, lines, text_of
+from cnc_shape.readers.source import Bytes, ReadingLimits, Source, as_bytes, blocks, line_at, lines, text_of
 from cnc_shape.units import DEGREE, MM_PER_INCH, MM_PER_MIN
 
 _LENGTHS = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1e3, "in": MM_PER_INCH}
@@ -57,6 +57,17 @@ def read_header(source: Source) -> Header:
         An unknown or a repeated column, or no axis.
     """
     number, line = next(((number, line) for number, line in lines(source) if line.strip()), (1, ""))
+    return parse_header(source.name, number, line)
+
+
+def parse_header(source: str, number: int, line: str) -> Header:
+    """Read the header of the table called `source`.
+
+    Raises
+    ------
+    ProgramError
+        An unknown or a repeated column, or no axis.
+    """
     names: list[str] = []
     scales: list[float] = []
     column = 1
@@ -68,7 +79,7 @@ def read_header(source: Source) -> Header:
         if known is None:
             close = get_close_matches(text.lower(), COLUMNS, 1, 0.6)
             raise ProgramError(
-                source.name,
+                source,
                 number,
                 at,
                 f"unknown column {text!a}",
@@ -77,13 +88,11 @@ def read_header(source: Source) -> Header:
                 else "columns are named x_mm, y_mm, a_deg, feed_mm_min, time_s",
             )
         if known[0] in names:
-            raise ProgramError(
-                source.name, number, at, f"a second column for {known[0]}", hint="keep one of them"
-            )
+            raise ProgramError(source, number, at, f"a second column for {known[0]}", hint="keep one of them")
         names.append(known[0])
         scales.append(known[1])
     if not set(names) & {*XYZ, *ROTARY}:
-        raise ProgramError(source.name, number, 1, "no column is an axis", hint="name a column x_mm")
+        raise ProgramError(source, number, 1, "no column is an axis", hint="name a column x_mm")
     return Header(tuple(names), tuple(scales))
 
 
@@ -117,7 +126,7 @@ def read_rows(source: Source, header: Header, *, rows: int, compiled_from: int) 
     ProgramError
         A ragged row, text, an infinite or a huge number; once the rows before it have been handed on.
     """
-    readable = _RowReader(source, header)
+    readable = RowReader(source.name, source.limits, header)
     compiled = source.size >= compiled_from
     rows = min(rows, source.size)  # there cannot be more
     values, line = np.empty((rows, len(header.names))), np.empty(rows, dtype=np.int64)
@@ -156,47 +165,54 @@ def read_rows(source: Source, header: Header, *, rows: int, compiled_from: int) 
 
 
 def _take_plain_rows(
-    text: Bytes, at: int, number: int, reader: _RowReader, values: FloatArray, line: IntArray, count: int
+    text: Bytes, at: int, number: int, reader: RowReader, values: FloatArray, line: IntArray, count: int
 ) -> tuple[int, int, int]:
     from cnc_shape.kernels.plain_rows import plain_rows  # a short table need not load compiled code
 
     return plain_rows(text, at, number, reader.line_bytes, reader.scales, reader.bounds, values, line, count)
 
 
-class _RowReader:
+class RowReader:
     """The readable way: one line at a time."""
 
-    def __init__(self, source: Source, header: Header) -> None:
-        self._source, self._header = source, header
+    def __init__(self, name: str, limits: ReadingLimits, header: Header) -> None:
+        self._name, self._limits, self._header = name, limits, header
         self._pattern = re.compile(",".join([_CELL] * len(header.names)))
-        limit = source.limits.coordinate
-        self.line_bytes = source.limits.line_bytes
+        self.line_bytes = limits.line_bytes
         self.scales: FloatArray = np.array(header.scales)
         self.bounds: FloatArray = np.array(
             [
-                limit * (DEGREE if name in ROTARY else 1.0) if name in (*XYZ, *ROTARY) else 1e12
+                limits.coordinate * (DEGREE if name in ROTARY else 1.0) if name in (*XYZ, *ROTARY) else 1e12
                 for name in header.names
             ]
         )
 
     def row(self, number: int, line: bytes, *, ahead: bool) -> FloatArray | None:
         """Return the values of a line, None if it is blank or the header."""
-        name, header = self._source.name, self._header
-        text = text_of(name, number, line, self._source.limits)
+        text = text_of(self._name, number, line, self._limits)
         if ahead or not text.strip():
             return None
+        return self.values(number, self.cells(number, text))
+
+    def cells(self, number: int, text: str) -> re.Match[str]:
+        """Return the numbers of a line that is not blank, as they are written, each a group."""
         match = self._pattern.fullmatch(text)
         if match is None:
-            raise _diagnose(name, number, text, header)
-        values = np.array([float(cell) for cell in match.groups()]) * self.scales
+            raise _diagnose(self._name, number, text, self._header)
+        return match
+
+    def values(self, number: int, cells: re.Match[str]) -> FloatArray:
+        """Return what the cells of a line say, in mm, rad, s and mm/s."""
+        values = np.array([float(cell) for cell in cells.groups()]) * self.scales
         beyond = np.flatnonzero(~(np.abs(values) <= self.bounds))
         if beyond.size:
             place = int(beyond[0])
             raise ProgramError(
-                name,
+                self._name,
                 number,
-                match.start(place + 1) + 1,
-                f"{header.names[place]} is beyond the limit of {self.bounds[place] / self.scales[place]:g}",
+                cells.start(place + 1) + 1,
+                f"{self._header.names[place]} is beyond the limit of "
+                f"{self.bounds[place] / self.scales[place]:g}",
                 hint="check the number and its unit",
             )
         return values

@@ -39,8 +39,13 @@ def common_delay(shapers: Mapping[str, Shaper]) -> float:
     return max((shaper.delay for shaper in shapers.values()), default=0.0)
 
 
-def delays(shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: float) -> Delays:
-    """Place the impulses of every axis on the servo grid; an axis without a shaper is only delayed."""
+def delays(
+    shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: float, *, aligned: bool = True
+) -> Delays:
+    """Place the impulses of every axis on the servo grid; an axis without a shaper is only delayed.
+
+    Where the axes are not `aligned`, every first impulse is at 0, and each axis late by its own centroid.
+    """
     chosen = [shapers.get(axis, NONE) for axis in axes]
     common = common_delay(shapers)
     most = max(shaper.times.size for shaper in chosen)
@@ -48,7 +53,7 @@ def delays(shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: fl
     share, amplitude = np.zeros((len(axes), most)), np.zeros((len(axes), most))
     longest = 0.0
     for row, shaper in enumerate(chosen):
-        times = shaper.times + (common - shaper.delay)
+        times = shaper.times + (common - shaper.delay if aligned else 0.0)
         longest = max(longest, float(times[-1]))
         samples = times / sample_time
         nearest = np.rint(samples)
@@ -61,7 +66,7 @@ def delays(shapers: Mapping[str, Shaper], axes: tuple[str, ...], sample_time: fl
 
 
 def shaping(
-    shapers: Mapping[str, Shaper], sample_time: float
+    shapers: Mapping[str, Shaper], sample_time: float, *, aligned: bool = True
 ) -> Callable[[Trajectory | None, Trajectory, bool], tuple[Trajectory | None, Trajectory]]:
     """Return the resumable stage that shapes the axis commands.
 
@@ -72,22 +77,22 @@ def shaping(
     def step(
         history: Trajectory | None, command: Trajectory, last: bool
     ) -> tuple[Trajectory | None, Trajectory]:
-        placed = delays(shapers, command.axes, sample_time)
+        placed = delays(shapers, command.axes, sample_time, aligned=aligned)
         kept = int(placed.whole.max(initial=0)) + 2
         if history is None:
             if len(command) == 0:
                 return None, command
-            history = _resting(command, 0, kept)
+            history = command.resting(0, kept)
         first = len(history)
         whole = join_trajectories([history, command])
         if last:
             after = ceil(placed.longest / sample_time - GRID_TOLERANCE)
-            whole = join_trajectories([whole, _resting(whole, -1, after)])
+            whole = join_trajectories([whole, whole.resting(-1, after)])
         shaped = delayed_sum(
             whole.position, whole.velocity, whole.acceleration, first, len(whole) - first,
             placed.whole, placed.share, placed.amplitude, placed.impulses, sample_time,
         )  # fmt: skip
-        place = _late(whole.arc_length, first, placed.common / sample_time)
+        place = whole.late_arc_length(first, placed.common / sample_time)
         return (
             whole.cut(slice(len(whole) - kept, None)),
             Trajectory(command.axes, sample_time, frozen(place), *(frozen(signal) for signal in shaped)),
@@ -112,26 +117,3 @@ def shape(command: Trajectory, shapers: Mapping[str, Shaper]) -> Trajectory:
         Starts at t = 0 where `command` starts, ends where it ends, later by the last impulse.
     """
     return shaping(shapers, command.sample_time)(None, command, True)[1]
-
-
-def _resting(command: Trajectory, row: int, samples: int) -> Trajectory:
-    """A command that rests for `samples` where `command` is at `row`."""
-    position = command.position[row]
-    still = frozen(np.zeros((samples, position.size)))
-    return Trajectory(
-        command.axes,
-        command.sample_time,
-        frozen(np.full(samples, command.arc_length[row])),
-        frozen(still + position),
-        still,
-        still,
-    )
-
-
-def _late(values: FloatArray, first: int, delay: float) -> FloatArray:
-    """`values` from row `first` on, `delay` samples ago, linear between samples."""
-    whole = int(np.floor(delay))
-    share = delay - whole
-    right = values[first - whole : values.size - whole]
-    left = values[first - whole - 1 : values.size - whole - 1]
-    return right + share * (left - right)
