@@ -216,7 +216,7 @@ def test_apply_answers_the_contract_and_its_file_reads_back(place, capfd):
     assert table.shape == (result["samples"], 4)
     assert_allclose(table[0], 0.0, atol=1e-12)
     assert_allclose(table[-1, 1:], 0.0, atol=1e-9)
-    assert_allclose(table[-1, 0], result["shaped_time_s"], atol=result["sample_time_s"])
+    assert 0.0 <= table[-1, 0] - result["shaped_time_s"] < 2 * result["sample_time_s"]
 
 
 def test_apply_says_what_simulate_says(place, capfd):
