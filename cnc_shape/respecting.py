@@ -1,8 +1,8 @@
 """Limits that hold after shaping: the motion is planned anew within lower ones, until they do.
 
 Shaped, an axis's velocity and acceleration reach at most ``sum |A_i|`` times what was planned: with positive
-impulses no more than that, with negative ones more. How much more depends on where the impulses meet, so it
-is measured, and the planner's limits of that axis go down by it.
+impulses no more than that, with negative ones more; contour shaping adds a little on curves. How much depends
+on where the impulses meet, so it is measured, and the planner's limits of that axis go down by it.
 """
 
 from __future__ import annotations

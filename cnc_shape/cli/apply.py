@@ -66,7 +66,13 @@ def apply(
     """Shape a program's axis commands; write them as a program, or as samples at the servo period."""
     if stream:
         from cnc_shape.cli.streaming import stream_samples
+        from cnc_shape.errors import OptionError
 
+        if tolerance_um is not None or respect_limits:
+            raise OptionError(
+                "--tolerance-um and --respect-limits are for programs, not for live samples",
+                hint="leave --stream out",
+            )
         stream_samples(file, output, machine, interpolation, sample_time_s, json=json, quiet=quiet)
         return
     from cnc_shape.applying import Application
