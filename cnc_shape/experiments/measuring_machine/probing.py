@@ -21,6 +21,7 @@ from cnc_shape.modes import Mode
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import Case, Run, run
 from cnc_shape.shapers import NONE, Shaper, ei, sd, zv, zvd
+from cnc_shape.shapers.command_shaping import CommandShaping
 
 COLUMN = Mode(natural_frequency=25.0, damping_ratio=0.02)
 TOO_HIGH = Mode(natural_frequency=27.5, damping_ratio=0.02)  # a model that is 10 % off
@@ -101,7 +102,7 @@ def machine_run() -> Run:
         "zv": {name: zv(mode) for name, mode in flexible.items()},
         "zvd": {name: zvd(mode) for name, mode in flexible.items()},
     }
-    cases = [Case(name, of, alone) for name, of in made.items()]
+    cases = [Case(name, CommandShaping(of), alone) for name, of in made.items()]
     with open_motion(str(bundled(PROGRAM)), setup) as motion:
         return run(motion.blocks, setup, cases, motion.name, record=True)
 

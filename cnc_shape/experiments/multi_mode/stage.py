@@ -12,6 +12,7 @@ from cnc_shape.experiments.experiment import Row, Table
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import Case, CaseSummary, Run, run
 from cnc_shape.shapers import Shaper, cascade, multi_mode
+from cnc_shape.shapers.command_shaping import CommandShaping
 
 MACHINE, PROGRAM = "xy_stage.yaml", "bracket.nc"
 
@@ -27,7 +28,7 @@ def stage_run() -> Run:
         "multi_mode": {name: multi_mode(modes) for name, modes in flexible.items()},
     }
     alone = replace(setup.control, cross_coupling=None)
-    cases = [Case(name, of, alone) for name, of in shapers.items()]
+    cases = [Case(name, CommandShaping(of), alone) for name, of in shapers.items()]
     with open_motion(str(bundled(PROGRAM)), setup) as motion:
         return run(motion.blocks, setup, cases, motion.name, record=True)
 
