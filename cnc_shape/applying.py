@@ -6,7 +6,7 @@ does to the path is a contour error of its own. Both are told beside the samples
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +14,25 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.kernels.sums import largest_ratio
+from cnc_shape.limits import Limits
 from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
 from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, window
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """How much of an axis's limits a command takes; more than 1: it exceeds them."""
+
+    velocity: float  # -, largest over its limit
+    acceleration: float  # -
+
+    @property
+    def worst(self) -> float:
+        """The larger of the two."""
+        return max(self.velocity, self.acceleration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +46,12 @@ class Applied:
     axes: tuple[str, ...]
     command: Deviation  # contour error of the shaped command
     worst_limit_violation: float  # -, relative excess of the unshaped command; 0: it keeps its limits
-    shaped_acceleration_ratio: float  # -, largest shaped acceleration over its limit
+    loads: Mapping[str, Load]  # axis: of the shaped command
+
+    @property
+    def shaped_acceleration_ratio(self) -> float:
+        """Largest shaped acceleration over its limit."""
+        return max(load.acceleration for load in self.loads.values())
 
 
 class Application:
@@ -47,7 +66,9 @@ class Application:
         self._sample_time = sample_time
         self._axes: tuple[str, ...] = ()
         self._tally = Tally()
-        self._plain, self._shaped = np.zeros(1), np.zeros(1)  # largest ratios to the limits
+        self._plain = np.zeros(1)  # largest ratio to the limits, of the unshaped command
+        self._speed = self._push = np.zeros(0)  # (d,) largest velocity and acceleration, shaped
+        self._limits: list[Limits] = []
         self._samples = 0
         self._cycle_time = self._longer = 0.0
 
@@ -59,16 +80,18 @@ class Application:
         for block in self._motion:
             if shape is None or measure is None or velocity is None or acceleration is None:
                 self._axes = block.command.axes
-                limits = [axis.limits for axis in self._machine.with_axes(self._axes).axes]
-                velocity = frozen([limit.velocity for limit in limits])
-                acceleration = frozen([limit.acceleration for limit in limits])
+                self._limits = [axis.limits for axis in self._machine.with_axes(self._axes).axes]
+                velocity = frozen([limits.velocity for limits in self._limits])
+                acceleration = frozen([limits.acceleration for limits in self._limits])
+                self._speed = self._push = np.zeros(len(self._axes))
                 shape = command_shaping(self._shaping, self._axes, self._sample_time)
                 self._longer = self._shaping.longer(self._axes, self._sample_time)
                 measure = measuring(*window(0.0, self._longer, self._sample_time), WINDOW_MARGIN)
             largest_ratio(block.command.velocity, velocity, self._plain)
             largest_ratio(block.command.acceleration, acceleration, self._plain)
             shaped, command = shape(shaped, block.command, block.last)
-            largest_ratio(command.acceleration, acceleration, self._shaped)
+            self._speed = np.maximum(self._speed, np.abs(command.velocity).max(axis=0, initial=0.0))
+            self._push = np.maximum(self._push, np.abs(command.acceleration).max(axis=0, initial=0.0))
             signals = (command.position,)
             measured, (error,) = measure(measured, block.toolpath, command.arc_length, signals, block.last)
             self._tally = tally(self._tally, error)
@@ -79,6 +102,11 @@ class Application:
 
     def summary(self) -> Applied:
         """What shaping made of the motion; call it after the last block."""
+        peaks = zip(self._axes, self._limits, self._speed.tolist(), self._push.tolist(), strict=True)
+        loads = {
+            axis: Load(speed / limits.velocity, push / limits.acceleration)
+            for axis, limits, speed, push in peaks
+        }
         return Applied(
             self._cycle_time,
             self._cycle_time + self._longer,
@@ -87,7 +115,7 @@ class Application:
             self._axes,
             deviation(self._tally),
             _excess(self._plain),
-            float(self._shaped[0]),
+            loads,
         )
 
 

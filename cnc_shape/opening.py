@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cnc_shape.config.setup import Setup
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.machine import LINEAR_DEFAULT
+from cnc_shape.machine import LINEAR_DEFAULT, Machine
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
@@ -30,6 +30,7 @@ class OpenMotion:
     blocks: Iterator[Block]
     notes: list[Note] = field(default_factory=list[Note])
     moved: tuple[str, ...] = ()
+    timed: bool = False  # the file tells its own times, and nothing was planned
 
     def warnings(self, *, by_name: bool = False) -> list[str]:
         """What machine file and reader had to say, and which axes the machine does not describe.
@@ -60,11 +61,13 @@ def open_motion(
     options: ReadingOptions | None = None,
     timings: Sequence[Timing] = (PLAIN,),
     watched: Sequence[Timing] = (),
+    planner: Machine | None = None,
 ) -> Generator[OpenMotion]:
     """Open a file and plan it as it is read, once for each timing; where it tells the time itself, replay it.
 
     Tool lengths are the machine's where `options` have none. A time trajectory cannot be path-shaped: that is
-    refused in `timings`, and left out of the `watched` ones.
+    refused in `timings`, and left out of the `watched` ones. The planner keeps the limits of `planner`, by
+    default the machine's own.
 
     Raises
     ------
@@ -84,10 +87,12 @@ def open_motion(
             _refuse_path_shaping(timings, opened.source)
             command, toolpath = resample(opened.timed, period, samples=options.limits.samples)
             blocks = replaying(command, toolpath)
+            motion.timed = True
         else:
             every = tuple(dict.fromkeys((*timings, *watched)))
             chunks = _noted(opened.chunks, motion.notes)
-            blocks = moving(chunks, setup.machine, setup.planning.path_tolerance, period, every)
+            machine = planner or setup.machine
+            blocks = moving(chunks, machine, setup.planning.path_tolerance, period, every)
         motion.blocks = _watched(blocks, motion)
         yield motion
 

@@ -33,6 +33,7 @@ from cnc_shape.shapers.live import LiveShaper, filters
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.writers.points import points_file, points_of
+from cnc_shape.writers.program import write_program
 
 MACHINES = ("xy_stage.yaml", "mill_three_axis.yaml")  # ideal and lagging drives, with modes and without
 SMALL_CHUNK = 4  # rows, so that every stage is entered with a state
@@ -109,8 +110,7 @@ def _apply(path: Path, setup: Setup, options: ReadingOptions) -> None:
     shaping = setup.command_shaping(setup.planning.shaping)
     with open_motion(str(path), setup, options) as motion:
         work = Application(motion.blocks, setup.machine, shaping, setup.control.sample_time)
-        for _ in work.blocks():
-            pass
+        write_program(path.with_suffix(".shaped.nc"), work.blocks(), force=True)
         work.summary()
 
 

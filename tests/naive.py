@@ -482,3 +482,28 @@ def filtered(samples, weights):
                 total += weight * samples[min(max(n - k, 0), len(samples) - 1)]
         out.append(total)
     return np.array(out)
+
+
+# --- straight pieces of a sampled motion ------------------------------------------------------------
+
+
+def knots(points, directions, slack, rest):
+    """Numbers of the samples where straight pieces meet: each chord held against every sample it passes."""
+    still = [0] * len(points)  # periods without motion up to each sample
+    for k in range(1, len(points)):
+        still[k] = still[k - 1] + 1 if np.array_equal(points[k], points[k - 1]) else 0
+    found = [0]
+    for k in range(1, len(points)):
+        first, passed = found[-1], np.arange(found[-1] + 1, k)
+        chord = points[first] + np.outer((passed - first) / (k - first), points[k] - points[first])
+        if still[k] >= rest:
+            begin = k - still[k]
+        elif still[k] == 0 and still[k - 1] >= rest:
+            begin = k - 1
+        elif (np.abs((points[passed] - chord) @ directions.T) > slack).any():
+            begin = k - max(still[k], 1)
+        else:
+            continue
+        if begin > first:
+            found.append(begin)
+    return np.array([*found, len(points) - 1])

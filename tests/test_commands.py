@@ -120,10 +120,8 @@ def test_simulate_reads_standard_input(place):
         (["simulate", "part.nc", "-m", "absent.yaml"], "absent.yaml: error"),
         (["simulate", "part.nc", "--nonsense"], "no such option"),
         (["apply"], "missing argument"),
-        (["apply", "part.nc"], ".nc program is not built yet"),
-        (["apply", "part.nc", "-o", "out.nc"], ".nc is not built yet"),
         (["apply", "part.nc", "-o", "out"], "a file without suffix"),
-        (["apply", "part.nc", "-o", "part.nc"], ".nc is not built yet"),
+        (["apply", "part.nc", "-o", "part.nc"], "is the input itself"),
         (["apply", "part.nc", "-o", "absent/out.csv"], "the folder absent does not exist"),
         (["design", "zw", "--frequency-hz", "30"], "unknown shaper 'zw'"),
         (["design", "zv"], "zv is for one mode, not 2"),
@@ -209,16 +207,16 @@ def test_apply_answers_the_contract_and_its_file_reads_back(place, capfd):
     result = answer(capfd, "apply", "part.nc", "-o", "out.csv")
     assert set(result) == {
         "schema", "cycle_time_s", "shaped_time_s", "samples", "sample_time_s", "axes", "command_contour_rms_um",
-        "command_contour_max_um", "worst_limit_violation", "shaped_acceleration_ratio", "output",
+        "command_contour_max_um", "worst_limit_violation", "shaped_acceleration_ratio", "limits", "output",
     }  # fmt: skip
     assert result["worst_limit_violation"] <= 1e-6
-    assert result["shaped_acceleration_ratio"] <= 1 + 1e-6  # positive impulses
+    assert result["shaped_acceleration_ratio"] <= 1.2  # of contour shaping
     table = np.loadtxt(place / "out.csv", delimiter=",", skiprows=1)
     assert (place / "out.csv").read_text().splitlines()[0] == "time_s,x_mm,y_mm,z_mm"
     assert table.shape == (result["samples"], 4)
     assert_allclose(table[0], 0.0, atol=1e-12)
     assert_allclose(table[-1, 1:], 0.0, atol=1e-9)
-    assert_allclose(table[-1, 0], result["shaped_time_s"], atol=result["sample_time_s"])
+    assert 0.0 <= table[-1, 0] - result["shaped_time_s"] < 2 * result["sample_time_s"]
 
 
 def test_apply_says_what_simulate_says(place, capfd):

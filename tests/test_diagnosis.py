@@ -171,7 +171,7 @@ def test_after_warming_no_command_compiles_anything(tmp_path):
     commands = [["check", *map(str, samples), str(long)], ["doctor", "--warm"]]
     commands += [["simulate", str(sample)] for sample in samples]
     commands += [["simulate", str(samples[0]), "-o", str(tmp_path / "run")]]
-    commands += [["apply", str(samples[0]), "-o", str(tmp_path / "shaped.csv")]]
+    commands += [["apply", str(samples[0]), "-o", str(tmp_path / name)] for name in ("out.csv", "out.nc")]
     for command in commands:
         done = cnc_shape(*command, **environment)
         assert done.returncode == 0, done.stderr

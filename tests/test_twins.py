@@ -23,6 +23,7 @@ TWINS = {
     "kernels/extremes.py": ("naive.extremes", "test_recording.py"),
     "kernels/foot_point.py": ("naive.polyline_distance", "test_contour.py"),
     "kernels/hats.py": ("naive.hat_widths", "test_smoothing.py"),
+    "kernels/knots.py": ("naive.knots", "test_shaped_programs.py"),
     "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
     "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),
     "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python

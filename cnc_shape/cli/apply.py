@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Force, Json, Machine, PathStyle, Quiet
 
 if TYPE_CHECKING:
-    from cnc_shape.applying import Application, Applied
+    from cnc_shape.applying import Application
+    from cnc_shape.writers.program import WrittenProgram
 
-SUFFIXES = (".csv", ".npz")
+SAMPLES = (".csv", ".npz")
+PROGRAMS = (".nc", ".ngc", ".gcode")
 
 
 def apply(
@@ -21,9 +23,24 @@ def apply(
         typer.Argument(metavar="FILE", help="G-code or CSV; - for standard input.", show_default=False),
     ] = None,
     output: Annotated[
-        str | None, typer.Option("-o", "--output", help="OUT.csv or OUT.npz; - for CSV on standard output.")
+        str | None,
+        typer.Option(
+            "-o", "--output", help="OUT.nc, .ngc or .gcode; OUT.csv or .npz; - for CSV on standard output."
+        ),
     ] = None,
     machine: Machine = None,
+    tolerance_um: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance-um",
+            help="How closely a program follows the shaped motion, µm (and millidegrees); 1 by default.",
+            show_default=False,
+        ),
+    ] = None,
+    respect_limits: Annotated[
+        bool,
+        typer.Option("--respect-limits", help="Plan anew until the shaped motion keeps the axis limits."),
+    ] = False,
     dialect: Dialect = "auto",
     block_delete: BlockDelete = False,
     path: PathStyle = "polyline",
@@ -46,23 +63,26 @@ def apply(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
-    """Shape a program's axis commands and write them at the servo period."""
+    """Shape a program's axis commands; write them as a program, or as samples at the servo period."""
     if stream:
         from cnc_shape.cli.streaming import refuse_options, stream_samples
 
         refuse_options(
             {"--dialect": dialect != "auto", "--block-delete": block_delete, "--path": path != "polyline",
-             "--closed": closed, "--force": force}
+             "--closed": closed, "--force": force, "--tolerance-um": tolerance_um is not None,
+             "--respect-limits": respect_limits}
         )  # fmt: skip
         stream_samples(file, output, machine, interpolation, sample_time_s, json=json, quiet=quiet)
         return
     from cnc_shape.applying import Application
+    from cnc_shape.cli import applied
     from cnc_shape.cli.output import print_json, print_text, warn
     from cnc_shape.cli.progress import line_by_line, progress
     from cnc_shape.cli.reading import named_options
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.errors import OptionError
     from cnc_shape.opening import open_motion
+    from cnc_shape.respecting import respect_limits as find_limits
 
     if file is None:
         raise OptionError("missing argument 'FILE'", hint="name a program, or - for standard input")
@@ -73,23 +93,31 @@ def apply(
     if json and output == "-":
         raise OptionError("--json and -o - both want standard output", hint="name a file for the samples")
     target = _target(file, output, force=force)
+    as_program = target is not None and target.suffix.lower() in PROGRAMS
+    if tolerance_um is not None and not as_program:
+        raise OptionError("--tolerance-um is for programs: samples are exact", hint="write to OUT.nc")
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
+    respect = None
+    if respect_limits:
+        with progress("planning", None, quiet=quiet or json):
+            respect = find_limits(file, setup, options)
     kind = setup.planning.shaping
+    planner = respect.machine if respect else None
     with (
-        open_motion(file, setup, options, [setup.timing(kind)]) as motion,
+        open_motion(file, setup, options, [setup.timing(kind)], planner=planner) as motion,
         progress("applying", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)
         work = Application(blocks, setup.machine, setup.command_shaping(kind), setup.control.sample_time)
-        _write(work, target, force=force)
+        remarks = applied.remarks(motion.name, setup) if as_program else []
+        written = _write(work, target, tolerance_um, remarks, force=force)
         done = work.summary()
-    notes = [] if setup.acting_shapers else ["this machine has no shapers: the command is written unshaped"]
-    warn([*motion.warnings(), *notes], quiet=quiet)
+    warn([*motion.warnings(), *applied.notes(done, setup, target if written else None)], quiet=quiet)
     if json:
-        print_json("apply", _result(done, target))
+        print_json("apply", applied.result(done, target, written, respect, setup))
     elif target is not None:
-        print_text(_text(done, target))
+        print_text(applied.text(done, target, written, respect, setup))
 
 
 def _target(file: str, output: str | None, *, force: bool) -> Path | None:
@@ -100,18 +128,14 @@ def _target(file: str, output: str | None, *, force: bool) -> Path | None:
     if output == "-":
         return None
     if output is None:
-        stem = Path("stdin" if file == "-" else file).stem
-        if Path(file).suffix.lower() != ".csv":
-            raise OptionError(
-                "writing a shaped .nc program is not built yet", hint=f"name the output: -o {stem}.shaped.csv"
-            )
-        output = f"{stem}.shaped.csv"
+        table = Path(file).suffix.lower() == ".csv"
+        output = f"{Path('stdin' if file == '-' else file).stem}.shaped{'.csv' if table else '.nc'}"
     target = Path(output)
-    if target.suffix.lower() not in SUFFIXES:
-        hint = "use .csv or .npz" + (
-            "; .nc is not built yet" if target.suffix.lower() in (".nc", ".ngc") else ""
+    if target.suffix.lower() not in (*SAMPLES, *PROGRAMS):
+        raise OptionError(
+            f"cannot write {target.suffix or 'a file without suffix'}: {output}",
+            hint=f"use {', '.join((*PROGRAMS, *SAMPLES))}",
         )
-        raise OptionError(f"cannot write {target.suffix or 'a file without suffix'}: {output}", hint=hint)
     if file != "-" and target.exists() and Path(file).exists() and target.samefile(file):
         raise OptionError(
             f"{output} is the input itself", hint="name another output: inputs are never overwritten"
@@ -120,7 +144,16 @@ def _target(file: str, output: str | None, *, force: bool) -> Path | None:
     return target
 
 
-def _write(work: Application, target: Path | None, *, force: bool) -> None:
+def _write(
+    work: Application, target: Path | None, tolerance_um: float | None, remarks: list[str], *, force: bool
+) -> WrittenProgram | None:
+    from cnc_shape.units import MICROMETRE
+
+    if target is not None and target.suffix.lower() in PROGRAMS:
+        from cnc_shape.writers.program import write_program
+
+        tolerance = MICROMETRE * (1.0 if tolerance_um is None else tolerance_um)
+        return write_program(target, work.blocks(), tolerance=tolerance, remarks=remarks, force=force)
     from cnc_shape.writers.samples import stream_csv, write_csv, write_npz
 
     if target is None:
@@ -132,34 +165,4 @@ def _write(work: Application, target: Path | None, *, force: bool) -> None:
         write_csv(target, work.blocks(), force=force)
     else:
         write_npz(target, work.blocks(), force=force)
-
-
-def _result(done: Applied, target: Path | None) -> dict[str, Any]:
-    from cnc_shape.units import MICROMETRE
-
-    return {
-        "cycle_time_s": done.cycle_time,
-        "shaped_time_s": done.shaped_time,
-        "samples": done.samples,
-        "sample_time_s": done.sample_time,
-        "axes": list(done.axes),
-        "command_contour_rms_um": done.command.rms / MICROMETRE,
-        "command_contour_max_um": done.command.max / MICROMETRE,
-        "worst_limit_violation": done.worst_limit_violation,
-        "shaped_acceleration_ratio": done.shaped_acceleration_ratio,
-        "output": "-" if target is None else str(target),
-    }
-
-
-def _text(done: Applied, target: Path) -> str:
-    from cnc_shape.units import MICROMETRE
-
-    return "\n".join(
-        (
-            f"{target}: {done.samples} samples of {', '.join(axis.upper() for axis in done.axes)}",
-            f"  {done.shaped_time:.3f} s shaped, {done.cycle_time:.3f} s unshaped",
-            f"  command leaves the path by up to {done.command.max / MICROMETRE:.2f} µm "
-            f"({done.command.rms / MICROMETRE:.2f} µm RMS)",
-            f"  largest acceleration {done.shaped_acceleration_ratio:.1%} of its limit",
-        )
-    )
+    return None

@@ -92,9 +92,7 @@ def stream_csv(write: Write, blocks: Iterable[Trajectory]) -> tuple[int, bytes]:
     for index, block in enumerate(blocks):
         if index == 0:
             write((csv_header(block.axes) + "\n").encode("ascii"))
-        table = np.column_stack(
-            [sample_times(count, len(block), block.sample_time), _positions(block, count)]
-        )
+        table = np.column_stack([sample_times(count, len(block), block.sample_time), positions(block, count)])
         digest.update(table.tobytes())
         write("".join([",".join(map(repr, row)) + "\n" for row in table.tolist()]).encode("ascii"))
         count += len(block)
@@ -216,12 +214,19 @@ def _arrays(block: Trajectory, first: int) -> Iterator[tuple[str, FloatArray]]:
             yield f"{signal}_{rotary_unit}", degrees(values[:, rotary])
 
 
-def _positions(block: Trajectory, first: int) -> FloatArray:
+def positions(block: Trajectory, first: int) -> FloatArray:
+    """Return the positions of a block in mm and degrees, (n,d); `first`: number of its first sample.
+
+    Raises
+    ------
+    InfeasibleError
+        A value that is not finite.
+    """
     _require_finite(block, block.position, "position", first)
     _, rotary = _split(block.axes)
-    positions = block.position.copy()
-    positions[:, rotary] = degrees(positions[:, rotary])
-    return positions
+    values = block.position.copy()
+    values[:, rotary] = degrees(values[:, rotary])
+    return values
 
 
 def _require_finite(block: Trajectory, values: FloatArray, signal: str, first: int) -> None:
