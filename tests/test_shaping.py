@@ -34,6 +34,18 @@ def test_constant_velocity_is_unchanged(shaper):
     assert_allclose(shaped.arc_length[steady], 50.0 * (np.arange(len(line)) * T - delay)[steady], atol=1e-11)
 
 
+def test_a_shaper_ahead_of_its_command_delays_no_axis_below_zero():
+    ahead = make_shaper([0.0, 0.02], [3.0, -2.0])  # centroid -40 ms
+    line = straight(T, (1.0, 2.0, 0.5), 50.0, 0.5)
+    shaped = shape(line, {"x": ahead})
+    assert common_delay({"x": ahead}) == 0.0
+    assert_array_equal(
+        shaped.position[:, 1:], np.vstack([line.position, shaped.position[len(line) :]])[:, 1:]
+    )
+    steady = slice(80, len(line))  # x is late by 40 ms more than its own centroid: in step with y and z
+    assert_allclose(shaped.position[steady, 0], line.position[steady, 0], atol=1e-11)
+
+
 @pytest.mark.parametrize("shaper", SHAPERS.values(), ids=SHAPERS)
 def test_starts_and_ends_where_the_command_does_and_lasts_longer_by_the_last_impulse(shaper):
     command = point_to_point(T)

@@ -35,8 +35,12 @@ class Delays:
 
 
 def common_delay(shapers: Mapping[str, Shaper]) -> float:
-    """Largest centroid of all shapers, s."""
-    return max((shaper.delay for shaper in shapers.values()), default=0.0)
+    """Largest centroid of all shapers, s, and 0 at least.
+
+    Negative impulses can put a centroid before 0, a command ahead of itself; an axis without a shaper, whose
+    centroid is 0, cannot follow it there.
+    """
+    return max([0.0, *(shaper.delay for shaper in shapers.values())])
 
 
 def delays(
