@@ -77,6 +77,7 @@ class Application:
         shaped: CommandState | None = None
         measured: MeasuringState | None = None
         shape = measure = velocity = acceleration = None
+        longer = 0.0
         for block in self._motion:
             if shape is None or measure is None or velocity is None or acceleration is None:
                 self._axes = block.command.axes
@@ -85,8 +86,8 @@ class Application:
                 acceleration = frozen([limits.acceleration for limits in self._limits])
                 self._speed = self._push = np.zeros(len(self._axes))
                 shape = command_shaping(self._shaping, self._axes, self._sample_time)
-                self._longer = self._shaping.longer(self._axes, self._sample_time)
-                measure = measuring(*window(0.0, self._longer, self._sample_time), WINDOW_MARGIN)
+                longer = self._shaping.longer(self._axes, self._sample_time)
+                measure = measuring(*window(0.0, longer, self._sample_time), WINDOW_MARGIN)
             largest_ratio(block.command.velocity, velocity, self._plain)
             largest_ratio(block.command.acceleration, acceleration, self._plain)
             shaped, command = shape(shaped, block.command, block.last)
@@ -96,7 +97,9 @@ class Application:
             measured, (error,) = measure(measured, block.toolpath, command.arc_length, signals, block.last)
             self._tally = tally(self._tally, error)
             self._samples += len(command)
-            self._cycle_time = block.cycle_time
+            law = block.timing.path_shaper if block.timing else None  # has been through its shaper already
+            self._longer = longer + (law.duration if law else 0.0)
+            self._cycle_time = block.cycle_time + longer - self._longer
             if len(command):
                 yield command
 

@@ -13,6 +13,7 @@ from itertools import product
 
 from cnc_shape.config.setup import Setup, Shaping
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
+from cnc_shape.errors import OptionError
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import Block
 from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, settling_time, window
@@ -179,17 +180,29 @@ class ModelTrial:
         self._measure = measuring(*reach, WINDOW_MARGIN)
 
 
+def _timings(setup: Setup) -> dict[Shaping, Timing]:
+    """How each kind times the motion; shapers without a common one leave path shaping out."""
+    found: dict[Shaping, Timing] = {}
+    for kind in KINDS if setup.shapers else ():
+        try:
+            found[kind] = setup.timing(kind)
+        except OptionError:
+            if kind is setup.planning.shaping:
+                raise
+    return found
+
+
 class Trade:
     """All kinds of shaping under way on one program: feed it every block, then ask for the rows."""
 
     def __init__(self, setup: Setup) -> None:
         structures = models(setup.machine)
-        kinds = tuple(KINDS) if setup.shapers else ()
-        timings = {kind: setup.timing(kind) for kind in kinds}
+        timings = _timings(setup)
         self.timings = tuple(dict.fromkeys([PLAIN, *timings.values()]))
-        self._factors = {kind: contour_factors(setup, kind) for kind in kinds}
+        self._factors = {kind: contour_factors(setup, kind) for kind in timings}
         self._trials = {
-            kind: ModelTrial(setup, setup.command_shaping(kind), timings[kind], structures) for kind in kinds
+            kind: ModelTrial(setup, setup.command_shaping(kind), timing, structures)
+            for kind, timing in timings.items()
         }
 
     def advance(self, block: Block) -> None:

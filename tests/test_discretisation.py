@@ -246,6 +246,11 @@ def test_half_the_shaper_is_the_longest_interval():
     assert discretise(zv(MODE), 0.25, LINEAR).weights.tolist() == [0.5, 0.0, 0.5]
 
 
+def test_a_shaper_of_more_samples_than_memory_should_hold_is_refused():
+    with pytest.raises(OptionError, match="more than 200000"):
+        discretise(zv(Mode(30.0, 0.0)), 1e-9, Interpolation.LINEAR)
+
+
 def test_a_delay_shorter_than_the_shaper_is_a_bug():
     with pytest.raises(ValueError, match="delay"):
         discretise(zv(MODE), 0.1, LINEAR, delay=0.2)

@@ -23,7 +23,7 @@ from cnc_shape.errors import InfeasibleError, OptionError, OutputError
 from cnc_shape.kernels.knots import find_knots
 from cnc_shape.modes import Mode
 from cnc_shape.opening import open_motion
-from cnc_shape.shapers import zv
+from cnc_shape.shapers import umzv, zv
 from cnc_shape.shapers.shaping import shape
 from cnc_shape.trajectory import Trajectory, join_trajectories
 from cnc_shape.writers import program as writer
@@ -390,6 +390,29 @@ def test_a_time_trajectory_becomes_a_program(place, capfd):
     position = np.hstack([archive["position_mm"], np.deg2rad(archive["position_deg"])])
     assert_follows((place / "times.nc").read_text(), command_of(position, ("x", "y", "z", "a")), 1e-3)
     assert 0.0 < result["program_deviation_mdeg"] <= 1.0
+
+
+def test_a_time_trajectory_is_not_told_to_be_planned_anew(place, capfd):
+    rows = "".join(f"{0.01 * k:.2f},{(k % 2) * 0.5}\n" for k in range(40))
+    (place / "shaken.csv").write_text("time_s,x_mm\n" + rows)
+    assert run(["apply", "shaken.csv"]) == 0
+    told = capfd.readouterr().err
+    assert "exceeds limits: X by" in told
+    assert "--respect-limits" not in told
+
+
+def test_the_cycle_time_is_that_before_shaping_whatever_is_shaped(place, capfd):
+    alike = NEGATIVE.replace("frequency_hz: 37, damping_ratio: 0.05", "frequency_hz: 30, damping_ratio: 0.02")
+    for kind in ("path", "axis"):
+        (place / f"{kind}.yaml").write_text(f"{alike}planning: {{shaping: {kind}}}\n")
+    path, axis = (
+        answer(capfd, "apply", "part.nc", "-m", f"{kind}.yaml", "-o", f"{kind}.npz")
+        for kind in ("path", "axis")
+    )
+    duration = umzv(Mode(30.0, 0.02)).duration
+    for result in (path, axis):
+        assert result["shaped_time_s"] - result["cycle_time_s"] == pytest.approx(duration, abs=1e-9)
+    assert path["cycle_time_s"] == pytest.approx(axis["cycle_time_s"], abs=1e-9)
 
 
 def test_a_program_that_starts_elsewhere_goes_there_first(place, capfd):

@@ -12,8 +12,10 @@ from cnc_shape.api import simulate_program
 from cnc_shape.cases import default_cases, timings
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
+from cnc_shape.modes import Mode
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import run
+from cnc_shape.shapers import cascade
 from cnc_shape.trade import NOMINAL, Trade, models, off_by
 
 
@@ -50,6 +52,13 @@ def test_contour_shaping_is_the_best_of_all_kinds_on_the_bundled_sample():
         assert values["contour_shaped"] < values["axis_shaped"] < values["path_shaped"] < values["unshaped"]
     assert rows["contour_shaped"].contour_factors == {"x": 0.0, "y": 0.0}
     assert rows["axis_shaped"].contour_factors["x"] == pytest.approx(-0.643, abs=1e-3)
+
+
+def test_shapers_with_no_common_one_leave_path_shaping_out():
+    setup = load_machine(bundled("xy_stage.yaml"))
+    modes = [[Mode(f + 7.0 * k, 0.01) for k in range(6)] for f in (30.0, 31.0)]
+    setup = replace(setup, shapers=dict(zip("xy", map(cascade, modes), strict=True)))
+    assert list(traded("clover.csv", setup)) == ["unshaped", "axis_shaped", "contour_shaped"]
 
 
 def test_a_corner_is_the_case_run_on_a_machine_that_is_off_so_much():

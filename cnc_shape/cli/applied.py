@@ -90,8 +90,11 @@ def text(
     return "\n".join(lines)
 
 
-def notes(done: Applied, setup: Setup, program: Path | None) -> list[str]:
-    """Warnings about what was applied; `program`: the program that was written, if any."""
+def notes(done: Applied, setup: Setup, program: Path | None, *, timed: bool = False) -> list[str]:
+    """Warnings about what was applied.
+
+    program: the one that was written, if any; timed: the input told its own times, and nothing was planned.
+    """
     told = [] if setup.acting_shapers else ["this machine has no shapers: the command is written unshaped"]
     over = [
         f"{axis.upper()} by {ratio - 1.0:.2%} in {what}"
@@ -100,9 +103,8 @@ def notes(done: Applied, setup: Setup, program: Path | None) -> list[str]:
         if ratio > KEPT
     ]
     if over:
-        told.append(
-            f"warning: the shaped command exceeds limits: {', '.join(over)}; --respect-limits plans anew"
-        )
+        way = "its times are as given" if timed else "--respect-limits plans anew"
+        told.append(f"warning: the shaped command exceeds limits: {', '.join(over)}; {way}")
     if program is not None:
         told.append(
             f"{program} holds the motion alone: no spindle, coolant, tool change or other machine function"

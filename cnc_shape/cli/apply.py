@@ -113,7 +113,8 @@ def apply(
         remarks = applied.remarks(motion.name, setup) if as_program else []
         written = _write(work, target, tolerance_um, remarks, force=force)
         done = work.summary()
-    warn([*motion.warnings(), *applied.notes(done, setup, target if written else None)], quiet=quiet)
+    notes = applied.notes(done, setup, target if written else None, timed=motion.timed)
+    warn([*motion.warnings(), *notes], quiet=quiet)
     if json:
         print_json("apply", applied.result(done, target, written, respect, setup))
     elif target is not None:

@@ -35,6 +35,7 @@ VANISHED = 1e-6  # -, of the largest it could be: a derivative this small is one
 SOLVED = 1e-12  # -, what may be left of an equation
 GROWTH = 1.5  # -, how much larger than the shaper's the sum of |weights| may become
 WIDENINGS = 5  # how often more samples are taken to help before there is no answer
+MOST_TAPS = 200_000  # samples that a shaper may last
 COARSE = 0.03  # -, sample time over period beyond which rounding leaves more than 5 per cent
 
 
@@ -103,7 +104,7 @@ def discretise(
     Raises
     ------
     OptionError
-        A sample time that is not positive or longer than half the shaper.
+        A sample time that is not positive, longer than half the shaper, or far too short for it.
     InfeasibleError
         No exact taps near the impulses.
     ValueError
@@ -135,7 +136,8 @@ def check_sample_time(shaper: Shaper, sample_time: float) -> None:
     Raises
     ------
     OptionError
-        Not positive, not finite, or longer than half the shaper.
+        Not positive, not finite, longer than half the shaper, or so short that the shaper lasts more than
+        `MOST_TAPS` samples.
     """
     if not (isfinite(sample_time) and sample_time > 0.0):
         raise OptionError(
@@ -145,6 +147,13 @@ def check_sample_time(shaper: Shaper, sample_time: float) -> None:
         raise OptionError(
             f"a shaper of {1e3 * shaper.duration:.4g} ms cannot be sampled every {1e3 * sample_time:.4g} ms",
             hint=f"sample at least every {1e3 * shaper.duration / 2.0:.4g} ms, half its duration",
+            argument="sample_time",
+        )
+    if shaper.duration > MOST_TAPS * sample_time:
+        raise OptionError(
+            f"a shaper of {1e3 * shaper.duration:.4g} ms is {shaper.duration / sample_time:.4g} samples of "
+            f"{1e3 * sample_time:.4g} ms, more than {MOST_TAPS}",
+            hint=f"sample every {1e3 * shaper.duration / MOST_TAPS:.4g} ms or less often",
             argument="sample_time",
         )
 

@@ -17,7 +17,8 @@ from math import pi
 
 import numpy as np
 
-from cnc_shape.arrays import frozen
+from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.errors import InfeasibleError
 from cnc_shape.modes import Mode
 from cnc_shape.shapers.damped import from_impulse_vectors
 from cnc_shape.shapers.extra_insensitive import ei, three_hump_ei, two_hump_ei
@@ -57,7 +58,13 @@ def klipper_3hump_ei(mode: Mode, *, vibration_tolerance: float = 0.05) -> Shaper
 
 
 def fitted_ei(mode: Mode, *, vibration_tolerance: float = 0.05) -> Shaper:
-    """EI by the published fit to damping ratio and tolerance, as newer Klippers have it."""
+    """EI by the published fit to damping ratio and tolerance, as newer Klippers have it.
+
+    Raises
+    ------
+    InfeasibleError
+        So much damping that the fit's impulses are out of order.
+    """
     z, v = mode.damping_ratio, vibration_tolerance
     first = (0.24968 + 0.24961 * v) + (0.80008 + 1.23328 * v) * z + (0.49599 + 3.17316 * v) * z**2
     last = (0.25149 + 0.21474 * v) + (-0.83249 + 1.41498 * v) * z + (0.85181 - 4.90094 * v) * z**2
@@ -67,19 +74,30 @@ def fitted_ei(mode: Mode, *, vibration_tolerance: float = 0.05) -> Shaper:
         + (4.26169 - 108.644 * v) * v * z**2
         + (1.75601 + 336.989 * v) * v * z**3
     )
-    return Shaper(
-        times=frozen(np.array([0.0, middle, 1.0]) * mode.damped_period),
-        amplitudes=frozen([first, 1.0 - first - last, last]),
+    return _in_order(
+        mode, np.array([0.0, middle, 1.0]) * mode.damped_period, np.array([first, 1.0 - first - last, last])
     )
 
 
 def duet_ei2(mode: Mode) -> Shaper:
-    """Two-hump EI of 5 % by the published fit, as RepRapFirmware has it."""
+    """Two-hump EI of 5 % by the published fit, as RepRapFirmware has it.
+
+    Raises
+    ------
+    InfeasibleError
+        So much damping that the fit's impulses are out of order.
+    """
     return _fitted(mode, _TWO_HUMPS)
 
 
 def duet_ei3(mode: Mode) -> Shaper:
-    """Three-hump EI of 5 % by the published fit, as RepRapFirmware has it."""
+    """Three-hump EI of 5 % by the published fit, as RepRapFirmware has it.
+
+    Raises
+    ------
+    InfeasibleError
+        So much damping that the fit's impulses are out of order.
+    """
     return _fitted(mode, _THREE_HUMPS)
 
 
@@ -92,7 +110,19 @@ def _scaled(design: Callable[..., Shaper], mode: Mode, vibration_tolerance: floa
 def _fitted(mode: Mode, fit: Fit) -> Shaper:
     powers = mode.damping_ratio ** np.arange(4)
     amplitudes, times = (np.array(rows) @ powers for rows in fit)
-    return Shaper(
-        times=frozen(np.append(0.0, times) / mode.natural_frequency),
-        amplitudes=frozen(np.append(amplitudes, 1.0 - amplitudes.sum())),
+    return _in_order(
+        mode,
+        np.append(0.0, times) / mode.natural_frequency,
+        np.append(amplitudes, 1.0 - amplitudes.sum()),
     )
+
+
+def _in_order(mode: Mode, times: FloatArray, amplitudes: FloatArray) -> Shaper:
+    """The shaper of a fit, refused where the fit has left its range so far that its impulses change places."""
+    if (np.diff(times) <= 0.0).any():
+        raise InfeasibleError(
+            f"the published fit is for damping ratios up to 0.2: at {mode.damping_ratio:g} its impulses are "
+            "out of order",
+            hint="use ei, 2hump_ei or 3hump_ei, which are exact",
+        )
+    return Shaper(times=frozen(times), amplitudes=frozen(amplitudes))

@@ -135,14 +135,18 @@ def _text(handover: Handover, made: Shaper, heights: FloatArray, times: FloatArr
     word = None if family is None else _WORDS.get(family)
     if family is not None and word is not None:
         mode = handover.modes[0]
-        own = _own(family, mode)
-        if mode.damping_ratio <= MOST_DAMPING and _alike(own, handover.shaper):
+        try:
+            own = _own(family, mode)
+        except InfeasibleError:  # so much damping that the firmware's fit puts its impulses out of order
+            own = None
+        if own is not None and mode.damping_ratio <= MOST_DAMPING and _alike(own, handover.shaper):
             lines.append(remark(handover, own, rounding))
             frequency = decimal(mode.natural_frequency, MODE_DIGITS)
             damping = decimal(mode.damping_ratio, MODE_DIGITS)
             return _with_comments(lines, f'M593 P"{word}" F{frequency} S{damping}')
         reverse = ", in releases that reverse it" if family is Family.MZV else ""
-        lines.append(f'impulse by impulse: P"{word}" leaves {percent(left(own, handover.modes))}{reverse}')
+        leaves = "is out of order" if own is None else f"leaves {percent(left(own, handover.modes))}"
+        lines.append(f'impulse by impulse: P"{word}" {leaves}{reverse}')
     lines.append(remark(handover, made, rounding))
     h = ":".join(decimal(height, AMPLITUDE_DIGITS) for height in heights.tolist())
     t = ":".join(decimal(time, TIME_DIGITS) for time in times.tolist())
@@ -181,6 +185,7 @@ def _own(family: Family, mode: Mode) -> Shaper:
 
 def _alike(own: Shaper, designed: Shaper) -> bool:
     return bool(
-        np.abs(own.times - designed.times).max() <= ALIKE_CLOCKS / CLOCK
+        own.times.size == designed.times.size
+        and np.abs(own.times - designed.times).max() <= ALIKE_CLOCKS / CLOCK
         and np.abs(own.amplitudes - designed.amplitudes).max() <= ALIKE_AMPLITUDES
     )
