@@ -610,3 +610,14 @@ def test_measured_impulses_of_a_machine_need_no_mode(capfd, tmp_path):
 def test_a_target_refuses_in_python_too():
     with pytest.raises(InfeasibleError, match="knows zv"):
         EMITTERS[Target.MARLIN]([hand_over("ei", Mode(40.0, 0.0))])
+
+
+def test_a_fit_far_out_of_its_range_is_no_shaper_and_no_reason_to_fail():
+    mode = Mode(40.0, 0.5)
+    for name in ("duet_ei2", "fitted_ei"):
+        with pytest.raises(InfeasibleError, match="out of order"):
+            PLAIN[name](Mode(40.0, 0.5 if name == "duet_ei2" else 0.95))
+    exact = PLAIN["2hump_ei"](mode)  # of three impulses where the firmware has four
+    text = EMITTERS[Target.RRF]([Handover(None, "2hump_ei", {}, (mode,), exact)])
+    assert 'P"ei2" is out of order' in text
+    assert 'M593 P"custom"' in text
