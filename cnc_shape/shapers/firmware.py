@@ -113,12 +113,12 @@ def _fitted(mode: Mode, fit: Fit) -> Shaper:
     return _in_order(
         mode,
         np.append(0.0, times) / mode.natural_frequency,
-        np.append(amplitudes, 1.0 - amplitudes.sum()),
+        np.concatenate([amplitudes, [1.0 - amplitudes.sum()]], dtype=np.float64),
     )
 
 
 def _in_order(mode: Mode, times: FloatArray, amplitudes: FloatArray) -> Shaper:
-    """The shaper of a fit, refused where the fit has left its range so far that its impulses change places."""
+    """The shaper of a fit, refused where it is so far out of its range that impulses change places."""
     if (np.diff(times) <= 0.0).any():
         raise InfeasibleError(
             f"the published fit is for damping ratios up to 0.2: at {mode.damping_ratio:g} its impulses are "
