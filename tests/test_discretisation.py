@@ -249,6 +249,8 @@ def test_half_the_shaper_is_the_longest_interval():
 def test_a_shaper_of_more_samples_than_memory_should_hold_is_refused():
     with pytest.raises(OptionError, match="more than 200000"):
         discretise(zv(Mode(30.0, 0.0)), 1e-9, Interpolation.LINEAR)
+    with pytest.raises(OptionError, match="more than 200000"):  # of an axis that waits for another
+        discretise(NONE, 1e-9, Interpolation.LINEAR, delay=1.0)
 
 
 def test_a_delay_shorter_than_the_shaper_is_a_bug():
