@@ -66,6 +66,18 @@ def test_the_rest_of_the_program_keeps_its_pace(slowed):
     assert found.cases[1].tool.max < 0.05 < plain.cases[1].tool.max
 
 
+def test_only_what_leads_to_an_error_is_slowed(tmp_path):
+    """One sharp turn between two long lines: nothing is slowed that is passed long before or after it."""
+    part = tmp_path / "turn.nc"
+    part.write_text("G21 G90 G64 P0.005\nG1 X200 F6000\nY200\nM2\n")
+    found = slow_down(str(part), stage(), OPTIONS, 0.02)
+    assert found.met
+    slowed = path_places(str(part), stage(), OPTIONS)[found.slowdown.factor < 1.0]
+    inner = slowed[(slowed > 20.0) & (slowed < 380.0)]  # away from start and end
+    assert inner.size > 0
+    assert 190.0 < inner.min() < 200.0 < inner.max() < 210.0
+
+
 def test_slowing_everything_alike_costs_more(slowed):
     """The least factor for all cells keeps the tolerance, too, but takes much longer."""
     alike = replace(
