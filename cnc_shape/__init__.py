@@ -9,9 +9,9 @@ What the commands do is a few lines of Python::
     print(run.summary.cases[1].tool.max)
     cs.write_report(run, "report", setup)
 
-and every stage on its own: `read_program`, `build_toolpath`, `smooth`, `plan`, `sample`, `shape`, `simulate`,
-`contour_error`. Shapers are designed by the functions of `cnc_shape.design`. Names are imported when they are
-first used.
+and every stage on its own: `read_program`, `build_toolpath`, `smooth`, `plan`, `sample`, `shape` (axis by
+axis) or `shape_command` (as ``setup.command_shaping(kind)`` says), `simulate`, `contour_error`. Shapers are
+designed by the functions of `cnc_shape.design`. Names are imported when they are first used.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from cnc_shape.feedrate import plan
     from cnc_shape.modes import Mode
     from cnc_shape.readers import read_program
+    from cnc_shape.shapers.command_shaping import shape_command
     from cnc_shape.shapers.shaping import shape
     from cnc_shape.simulation import simulate
     from cnc_shape.smoothing import Smoothing, smooth
@@ -51,6 +52,7 @@ _HOMES = {
     "read_program": "readers",
     "sample": "trajectory",
     "shape": "shapers.shaping",
+    "shape_command": "shapers.command_shaping",
     "simulate": "simulation",
     "simulate_program": "api",
     "smooth": "smoothing",
@@ -60,7 +62,7 @@ _HOMES = {
 __all__ = [
     "Control", "CrossCoupling", "Feedforward", "Mode", "Smoothing", "__version__", "build_toolpath",
     "contour_error", "design", "foot_windows", "load_machine", "plan", "plot", "read_program", "sample",
-    "shape", "simulate", "simulate_program", "smooth", "write_report",
+    "shape", "shape_command", "simulate", "simulate_program", "smooth", "write_report",
 ]  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.report import folder as run_folder
 from cnc_shape.report.figures import path_figure
 from cnc_shape.report.style import Format
+from cnc_shape.slowing import slow_down
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +51,10 @@ def simulate_program(
     all_signals
         Keep every sample of them, however many there are.
     """
-    picked = default_cases(setup) if cases is None else pick_cases(setup, cases)
+    tolerance, slowdown = setup.planning.tool_tolerance, None
+    if tolerance is not None and setup.acting_shapers:
+        slowdown = slow_down(str(path), setup, options or ReadingOptions(), tolerance).slowdown
+    picked = default_cases(setup, slowdown) if cases is None else pick_cases(setup, cases, slowdown)
     with open_motion(str(path), setup, options, timings(picked)) as motion:
         return run(motion.blocks, setup, picked, motion.name, record=record, all_signals=all_signals)
 

@@ -9,23 +9,25 @@ from cnc_shape.config.setup import Setup, Shaping
 from cnc_shape.controllers import Control
 from cnc_shape.errors import OptionError
 from cnc_shape.pipeline import Case
-from cnc_shape.timing import PLAIN, Timing
+from cnc_shape.timing import PLAIN, Slowdown, Timing
 
 KINDS = {"contour_shaped": Shaping.CONTOUR, "axis_shaped": Shaping.AXIS, "path_shaped": Shaping.PATH}
 
 
-def default_cases(setup: Setup) -> tuple[Case, ...]:
+def default_cases(setup: Setup, slowdown: Slowdown | None = None) -> tuple[Case, ...]:
     """Rows of a machine's table: unshaped, shaped, then one row more per configured term."""
     coupled = setup.control.cross_coupling is not None
     if not setup.acting_shapers:
         names = ["independent", *(["cross_coupled"] if coupled else [])]
     else:
         names = ["unshaped", "shaped", *(["shaped+cross_coupled"] if coupled else [])]
-    return pick_cases(setup, names)
+    return pick_cases(setup, names, slowdown)
 
 
-def pick_cases(setup: Setup, names: Sequence[str]) -> tuple[Case, ...]:
+def pick_cases(setup: Setup, names: Sequence[str], slowdown: Slowdown | None = None) -> tuple[Case, ...]:
     """Rows that the user names, in his order.
+
+    Where the machine's own shaping acts, the motion is as gentle as `slowdown` says.
 
     Raises
     ------
@@ -36,7 +38,7 @@ def pick_cases(setup: Setup, names: Sequence[str]) -> tuple[Case, ...]:
     for name in names:
         if name not in known:
             raise OptionError(f"this machine has no case called {name!r}", hint="it has " + ", ".join(known))
-    return tuple(_case(setup, name, *known[name]) for name in names)
+    return tuple(_case(setup, name, *known[name], slowdown) for name in names)
 
 
 def timings(cases: Sequence[Case]) -> tuple[Timing, ...]:
@@ -60,5 +62,8 @@ def _known(setup: Setup) -> dict[str, tuple[Shaping, Control]]:
     return known
 
 
-def _case(setup: Setup, name: str, shaping: Shaping, control: Control) -> Case:
-    return Case(name, setup.command_shaping(shaping), control, setup.timing(shaping))
+def _case(setup: Setup, name: str, shaping: Shaping, control: Control, slowdown: Slowdown | None) -> Case:
+    timing = setup.timing(shaping)
+    if shaping is setup.planning.shaping is not Shaping.NONE:
+        timing = replace(timing, slowdown=slowdown)
+    return Case(name, setup.command_shaping(shaping), control, timing)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -17,11 +17,11 @@ from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import PlanningState, Profile, planning
 from cnc_shape.machine import Machine
 from cnc_shape.program import Program
-from cnc_shape.shapers.path_shaping import PathShapingState, path_sampling
+from cnc_shape.shapers.path_shaping import path_sampling
 from cnc_shape.smoothing import Path, Smoothing, smoothing
 from cnc_shape.timing import PLAIN, Timing, rested
 from cnc_shape.toolpath import Toolpath, building, check_travel
-from cnc_shape.trajectory import SamplingState, Trajectory, sampling
+from cnc_shape.trajectory import Trajectory, sampling
 
 STILL = 1e-9  # mm or rad, an axis that moves no farther does not move
 
@@ -120,26 +120,33 @@ class _Drive:
 def drawing(timing: Timing, sample_time: float) -> Callable[[Profile, bool], Iterator[Drawn]]:
     """Return what samples the profiles of one motion, one after the other: the end so far, and samples."""
     if timing.path_shaper is None:
-        plain = sampling(sample_time)
-        sampled: SamplingState | None = None
+        return _in_turn(sampling(sample_time))
+    return _in_turn(path_sampling(timing.path_shaper, sample_time))
 
-        def draw(profile: Profile, last: bool) -> Iterator[Drawn]:
-            nonlocal sampled
-            for now, command in plain(sampled, profile, last):
-                sampled = now
-                yield now.end_time, command
 
-        return draw
-    shaped = path_sampling(timing.path_shaper, sample_time)
-    state: PathShapingState | None = None
+class _Timed(Protocol):
+    """A state that tells the end of the motion so far."""
 
-    def draw_shaped(profile: Profile, last: bool) -> Iterator[Drawn]:
+    @property
+    def end_time(self) -> float: ...
+
+
+S = TypeVar("S", bound=_Timed)
+
+
+def _in_turn(
+    step: Callable[[S | None, Profile, bool], Iterator[tuple[S, Trajectory]]],
+) -> Callable[[Profile, bool], Iterator[Drawn]]:
+    """Keep the state of a sampling step from one profile to the next."""
+    state: S | None = None
+
+    def draw(profile: Profile, last: bool) -> Iterator[Drawn]:
         nonlocal state
-        for now, command in shaped(state, profile, last):
+        for now, command in step(state, profile, last):
             state = now
             yield now.end_time, command
 
-    return draw_shaped
+    return draw
 
 
 def replaying(command: Trajectory, toolpath: Toolpath) -> Iterator[Block]:

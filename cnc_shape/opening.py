@@ -8,6 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from cnc_shape.arrays import FloatArray
+from cnc_shape.chunks import with_last
 from cnc_shape.config.setup import Setup
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import LINEAR_DEFAULT, Machine
@@ -16,7 +20,9 @@ from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
 from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.readers.trajectories import resample
+from cnc_shape.smoothing import Smoothing, smoothing
 from cnc_shape.timing import PLAIN, Timing
+from cnc_shape.toolpath import building
 
 
 @dataclass(slots=True)
@@ -77,9 +83,7 @@ def open_motion(
         While the blocks are drawn: what no motion can satisfy.
     """
     period = setup.control.sample_time
-    options = options or ReadingOptions()
-    if not options.gcode.tools:
-        options = replace(options, gcode=replace(options.gcode, tools=setup.tools))
+    options = with_tools(options, setup)
     with reading(path, options) as opened:
         name = "stdin" if path == STANDARD_INPUT else Path(path).name
         motion = OpenMotion(name, opened.source, setup, opened.lines, iter(()))
@@ -95,6 +99,36 @@ def open_motion(
             blocks = moving(chunks, machine, setup.planning.path_tolerance, period, every)
         motion.blocks = _watched(blocks, motion)
         yield motion
+
+
+def path_places(path: str, setup: Setup, options: ReadingOptions | None = None) -> FloatArray | None:
+    """Place on the toolpath at which each cell of a program's path starts, mm; None: it tells its own times.
+
+    Raises
+    ------
+    ProgramError
+        What is wrong with the file.
+    """
+    options = with_tools(options, setup)
+    build, smooth = building(), smoothing(Smoothing(setup.planning.path_tolerance))
+    built = smoothed = None
+    places: list[FloatArray] = []
+    with reading(path, options) as opened:
+        if opened.timed is not None:
+            return None
+        for chunk, last in with_last(opened.chunks):
+            built, toolpath = build(built, chunk, last)
+            smoothed, cells = smooth(smoothed, toolpath, last)
+            places.append(cells.arc_length)
+    return np.concatenate([np.zeros(0), *places])
+
+
+def with_tools(options: ReadingOptions | None, setup: Setup) -> ReadingOptions:
+    """Options with the machine's tool lengths where they have none."""
+    options = options or ReadingOptions()
+    if options.gcode.tools:
+        return options
+    return replace(options, gcode=replace(options.gcode, tools=setup.tools))
 
 
 def _refuse_path_shaping(timings: Sequence[Timing], source: str) -> None:

@@ -17,6 +17,7 @@ from cnc_shape.machine import Axis, Machine
 from cnc_shape.opening import open_motion
 from cnc_shape.readers import ReadingOptions
 from cnc_shape.readers.source import STANDARD_INPUT
+from cnc_shape.timing import Timing
 
 PLANS = 6  # tried at most
 KEPT = 1.0 + 1e-9  # -, of a limit: rounding
@@ -42,8 +43,8 @@ class Respect:
         }
 
 
-def respect_limits(path: str, setup: Setup, options: ReadingOptions) -> Respect:
-    """Find limits for the planner with which the shaped command keeps the machine's.
+def respect_limits(path: str, setup: Setup, options: ReadingOptions, timing: Timing) -> Respect:
+    """Find limits for the planner with which the shaped command keeps the machine's; timed as `timing` says.
 
     Raises
     ------
@@ -57,12 +58,11 @@ def respect_limits(path: str, setup: Setup, options: ReadingOptions) -> Respect:
             "--respect-limits reads the program more than once, and standard input is gone after the first",
             hint="write the program to a file",
         )
-    kind = setup.planning.shaping
-    machine, shaping = setup.machine, setup.command_shaping(kind)
+    machine, shaping = setup.machine, setup.command_shaping(setup.planning.shaping)
     cycle_time: float | None = None
     caution, worst = CAUTION, 0.0
     for plans in range(1, PLANS + 1):
-        with open_motion(path, setup, options, [setup.timing(kind)], planner=machine) as motion:
+        with open_motion(path, setup, options, [timing], planner=machine) as motion:
             if motion.timed:
                 raise OptionError(
                     f"{path} tells its own times: there is nothing to plan within lower limits",

@@ -7,10 +7,13 @@ shaping is as good as its worst corner.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
+import numpy as np
+
+from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup, Shaping
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.errors import OptionError
@@ -123,11 +126,20 @@ def contour_factors(setup: Setup, shaping: Shaping) -> dict[str, float]:
 
 
 class ModelTrial:
-    """One way to time and shape a motion, simulated with several structures at once."""
+    """One way to time and shape a motion, simulated with several structures at once.
+
+    Whoever `listens` is given the largest contour error of the tool in any of them, sample by sample.
+    """
 
     def __init__(
-        self, setup: Setup, shaping: CommandShaping, timing: Timing, structures: Sequence[Model]
+        self,
+        setup: Setup,
+        shaping: CommandShaping,
+        timing: Timing,
+        structures: Sequence[Model],
+        listen: Callable[[FloatArray], None] | None = None,
     ) -> None:
+        self._listen = listen
         self._setup = setup
         self._control = replace(setup.control, cross_coupling=None)
         self._how, self._timing, self._models = shaping, timing, tuple(structures)
@@ -157,6 +169,8 @@ class ModelTrial:
             self._measured, block.toolpath, said.arc_length, signals, block.last
         )
         self._tallies = [tally(state, error) for state, error in zip(self._tallies, errors, strict=True)]
+        if self._listen is not None:
+            self._listen(np.max([error.distance for error in errors[2:]], axis=0))
         if block.last:
             self._cycle_time = block.cycle_time + self._longer
 

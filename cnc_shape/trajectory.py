@@ -137,6 +137,20 @@ def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
     )
 
 
+def with_past(
+    history: Trajectory | None, command: Trajectory, kept: int, rest: int
+) -> tuple[Trajectory, int]:
+    """Return a chunk between what came before and `rest` samples of rest after it, and where it begins.
+
+    What came before is `history`, or, at the start of a motion, `kept` samples of rest.
+    """
+    history = command.resting(0, kept) if history is None else history
+    whole = join_trajectories([history, command])
+    if rest:
+        whole = join_trajectories([whole, whole.resting(-1, rest)])
+    return whole, len(history)
+
+
 def sample(profile: Profile, sample_time: float) -> Trajectory:
     """Sample a whole profile at a period of `sample_time` s."""
     return join_trajectories([trajectory for _, trajectory in sampling(sample_time)(None, profile, True)])

@@ -32,6 +32,7 @@ from cnc_shape.shapers.discretisation import Interpolation
 from cnc_shape.shapers.live import LiveShaper, filters
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
+from cnc_shape.trade import Trade
 from cnc_shape.writers.points import points_file, points_of
 from cnc_shape.writers.program import write_program
 
@@ -101,9 +102,9 @@ def _check(path: Path, options: ReadingOptions) -> None:
 def _simulate(path: Path, setup: Setup, options: ReadingOptions) -> None:
     late = replace(setup, control=replace(setup.control, delay_samples=1))
     for variant in (setup, late):
-        cases = default_cases(variant)
-        with open_motion(str(path), variant, options, timings(cases)) as motion:
-            run(motion.blocks, variant, cases, motion.name, record=True)
+        cases, trade = default_cases(variant), Trade(variant)
+        with open_motion(str(path), variant, options, timings(cases), trade.timings) as motion:
+            run(motion.blocks, variant, cases, motion.name, record=True, observers=[trade])
 
 
 def _apply(path: Path, setup: Setup, options: ReadingOptions) -> None:

@@ -21,10 +21,12 @@ def test_the_stages_one_by_one_give_what_the_command_gives():
     toolpath = cs.build_toolpath(program)
     limits = [axis.limits for axis in setup.machine.with_axes(program.axes).axes]
     command = cs.sample(cs.plan(cs.smooth(toolpath, cs.Smoothing(0.01)), limits), 1e-3)
-    shaped = cs.shape(command, setup.shapers)
+    shaped = cs.shape_command(command, setup.command_shaping(setup.planning.shaping))
     control = cs.Control(feedforward=setup.control.feedforward, position_gain=setup.control.position_gain)
     response = cs.simulate(shaped, setup.machine, control)
-    windows = cs.foot_windows(shaped.arc_length, 223, 98, 0.5)
+    longer = setup.command_shaping(setup.planning.shaping).longer(command.axes, 1e-3)
+    back, ahead = (int(np.ceil((k / 20 + longer) / 1e-3)) + 1 for k in (4.0, 1.5))
+    windows = cs.foot_windows(shaped.arc_length, back, ahead, 0.5)
     error = cs.contour_error(response.tool, toolpath, *windows)
     case = cs.simulate_program(bundled("bracket.nc"), setup, ["shaped"], record=False).summary.cases[0]
     assert_allclose([error.rms, error.max], [case.tool.rms, case.tool.max], rtol=1e-12)

@@ -25,6 +25,7 @@ from cnc_shape.shapers import ei, mzv, sd, umzv, zv, zvd
 from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.shapers.command_shaping import CommandShaping, shape_command
 from cnc_shape.shapers.shaper import convolve
+from cnc_shape.shapers.tool_corner import tool_errors
 from cnc_shape.simulation import simulate
 from cnc_shape.trajectory import Trajectory, join_trajectories
 
@@ -174,48 +175,60 @@ def test_a_fan_at_speed():
     assert 1e3 * found["path_shaped"].tool.rms >= 20.0
 
 
-def corner_in_closed_form(shaper, mode, dwell):
-    """Largest distance of the tool from a right-angled corner with a stop, over a/omega^2.
-
-    One axis brakes until t = 0, the other starts `dwell` s later, both with constant acceleration; the
-    oscillator's answer to both is known at every instant.
-    """
-    w, z = mode.omega, mode.damping_ratio
-    wd = w * np.sqrt(1.0 - z**2)
-    time = np.linspace(-0.05, 0.2, 50001)
-
-    def ringing(t):
-        return np.exp(-z * w * t) * (np.cos(wd * t) + z * w / wd * np.sin(wd * t))
-
-    def arriving(t):
-        return np.where(t < 0.0, 1.0 - 0.5 * (w * t) ** 2, ringing(np.maximum(t, 0.0)))
-
-    def leaving(t):
-        t = np.maximum(t, 0.0)
-        return 0.5 * (w * t) ** 2 - 1.0 + ringing(t)
-
-    taps = list(zip(shaper.amplitudes, shaper.times, strict=True))
-    x = sum(a * arriving(time - t) for a, t in taps)
-    y = sum(a * leaving(time - t - dwell) for a, t in taps)
-    inside = np.where(y > 0.0, np.minimum(-x, y), np.abs(y))
-    return np.where(x < 0.0, inside, np.where(y >= 0.0, x, np.hypot(x, y))).max()
-
-
 @pytest.mark.parametrize(
-    ("make", "none"), [(zv, 0.114), (mzv, 0.309), (zvd, 0.725)], ids=["zv", "mzv", "zvd"]
-)
-def test_what_a_stop_at_a_corner_leaves_by_its_dwell(make, none):
+    ("make", "kappa", "stop", "speed"),
+    [
+        (umzv, -0.095, 0.045, 0.174), (zv, -0.232, 0.114, 0.279), (mzv, -0.624, 0.309, 0.481),
+        (zvd, -1.464, 0.725, 0.774), (ei, -1.587, 0.761, 0.806),
+    ],
+    ids=["umzv", "zv", "mzv", "zvd", "ei"],
+)  # fmt: skip
+def test_what_the_tool_does_in_units_of_its_mode(make, kappa, stop, speed):
+    """Measured by the specification at a damping of 0.03; the stop of ei depends on its exact form."""
+    mode = Mode(42.0, 0.03)
+    found = tool_errors(make(mode), [mode])
+    assert found.curve * mode.omega**2 == pytest.approx(kappa, abs=0.01)
+    assert found.stop * mode.omega**2 == pytest.approx(stop, rel=0.05)
+    assert found.corner_at_speed * mode.omega == pytest.approx(speed, rel=0.02)
+
+
+@pytest.mark.parametrize("make", [zv, mzv, zvd])
+def test_what_a_stop_at_a_corner_leaves_by_its_dwell(make):
+    """The simulation of whole motions against the closed form."""
     mode = {a: Mode(42.0, 0.03) for a in "xy"}
     shaper = make(mode["x"])
-    scale = 5000.0 / mode["x"].omega ** 2  # mm, a/omega^2
-    for share in (0.0, 0.25, 0.5, 1.0):
+    ratios = tool_errors(shaper, [mode["x"]])
+    for share, expected in ((0.0, ratios.stop), (0.5, ratios.stop_half_dwell), (1.0, 0.0)):
         of = setup(mode, dict.fromkeys(mode, shaper), stop_dwell=share)
-        got = rows(of, square()[:2], ["axis_shaped"])["axis_shaped"].tool.max / scale
-        expected = corner_in_closed_form(shaper, mode["x"], share * shaper.duration)
-        assert got == pytest.approx(expected, rel=0.05, abs=1e-3)
-        if share == 0.0:
-            assert got == pytest.approx(none, rel=0.05)
-    assert got < 1e-3
+        got = rows(of, square()[:2], ["axis_shaped"])["axis_shaped"].tool.max
+        assert got == pytest.approx(expected * 5000.0, rel=0.05, abs=1e-3 * 5000.0 / mode["x"].omega ** 2)
+
+
+def test_a_corner_at_speed_goes_by_the_sine_of_its_angle():
+    """Commands that turn by 30, 90 and 150 degrees at constant speed, through shaper and structure."""
+    mode = Mode(42.0, 0.03)
+    time = np.arange(-0.5, 0.5, T)
+    before, after = np.minimum(time, 0.0), np.maximum(time, 0.0)
+    errors = {}
+    for angle in (30.0, 90.0, 150.0):
+        way = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+        position = 50.0 * (np.outer(before, [1.0, 0.0]) + np.outer(after, way))
+        velocity = 50.0 * np.where(time[:, None] < 0.0, [1.0, 0.0], way)
+        command = Trajectory(
+            ("x", "y"), T, frozen(50.0 * (time - time[0])), frozen(position), frozen(velocity),
+            frozen(np.zeros_like(position)),
+        )  # fmt: skip
+        shaped = shape_command(command, CommandShaping(dict.fromkeys("xy", zv(mode))))
+        tool = simulate(shaped, machine({"x": mode, "y": mode}), Control(sample_time=T)).tool[
+            4000 : time.size
+        ]
+        along, across = tool @ way, tool @ np.array([-way[1], way[0]])
+        first = np.where(tool[:, 0] <= 0.0, np.abs(tool[:, 1]), np.hypot(*tool.T))
+        second = np.where(along >= 0.0, np.abs(across), np.hypot(*tool.T))
+        errors[angle] = np.minimum(first, second).max() * mode.omega / 50.0
+    assert errors[90.0] == pytest.approx(0.279, rel=0.02)
+    assert errors[30.0] == pytest.approx(0.140, rel=0.02)
+    assert errors[150.0] == pytest.approx(0.140, rel=0.02)
 
 
 def test_without_alignment_a_circle_is_cut():

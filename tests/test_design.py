@@ -80,6 +80,7 @@ def test_the_contract(capfd):
     assert set(design) == {
         "axis", "shaper", "modes", "options", "times_s", "amplitudes", "duration_s", "delay_s", "residual_vibration",
         "sum_abs_amplitude", "max_running_sum", "contour_factor", "insensitivity", "model_error", "corner",
+        "tool",
     }  # fmt: skip
 
 

@@ -329,12 +329,36 @@ def test_look_ahead_is_a_stopping_distance_not_a_number_of_blocks():
     np.testing.assert_array_equal(part[: last + 1], whole[: last + 1])
 
 
-def test_chunks_of_cells_do_not_change_a_bit(monkeypatch):
+@pytest.mark.parametrize("gentleness", [0.25, 0.6])
+def test_gentleness_is_a_factor_of_the_acceleration_and_its_root_one_of_the_feed(gentleness):
+    path = smooth(lines([[0, 0], [100, 0]], 50.0), Smoothing(0.01))
+    _, profile = planning(MILL, frozen(np.full(len(path), gentleness)))(None, path, True)
+    speed, push = 50.0 * np.sqrt(gentleness), MILL[0].acceleration * gentleness
+    assert_allclose(profile.end_time, 100.0 / speed + speed / push, rtol=1e-9)
+    assert_allclose(profile.velocity.max(), speed, rtol=1e-12)
+
+
+def test_gentle_cells_alone_are_gentle():
+    """Random factors: each cell keeps its own accelerations, and they stay within the plain ones."""
+    path = smooth(wander(np.random.default_rng(5), 300), Smoothing(0.01))
+    factor = np.random.default_rng(6).uniform(0.2, 1.0, len(path))
+    _, profile = planning(MILL, frozen(factor))(None, path, True)
+    asked = replace(path, coefficients=frozen(path.coefficients / factor[:, None, None]),
+                    feed_rate=frozen(path.feed_rate / np.sqrt(factor)))  # fmt: skip
+    found = worst_violation(replace(profile, path=asked), MILL, 33)
+    assert found.acceleration <= 1e-6
+    assert found.feed <= 1e-6
+    assert profile.end_time > planned(wander(np.random.default_rng(5), 300)).end_time
+
+
+@pytest.mark.parametrize("gentle", [False, True])
+def test_chunks_of_cells_do_not_change_a_bit(monkeypatch, gentle):
     monkeypatch.setattr("cnc_shape.feedrate.PATIENCE", 1)
     path = smooth(wander(np.random.default_rng(3), 2000), Smoothing(0.01, 0.0, 0.0))
-    once = plan(path, MILL)
+    factor = frozen(np.random.default_rng(4).uniform(0.3, 1.0, len(path))) if gentle else None
+    _, once = planning(MILL, factor)(None, path, True)
     for size in (97, 1000):
-        step, state, parts = planning(MILL), None, []
+        step, state, parts = planning(MILL, factor), None, []
         for first in range(0, len(path), size):
             state, profile = step(state, path.cut(slice(first, first + size)), first + size >= len(path))
             parts.append(profile)

@@ -93,3 +93,14 @@ def test_many_at_once_are_as_one_by_one(tolerance):
     singles = [insensitivity(shaper, [mode], tolerance) for shaper in shapers]
     assert_allclose(low, [one.low for one in singles], atol=1e-12)
     assert_allclose(high, [one.high for one in singles], atol=1e-12)
+
+
+@pytest.mark.parametrize("damping", [0.999999, 1.0 - 1e-10, 1.0 - 1e-14])
+def test_a_mode_that_hardly_swings_is_scanned_where_there_is_something(damping):
+    """Its shapers last very many time constants; V is large only where the frequency is nearly 0."""
+    mode = Mode(40.0, damping)
+    for shaper in (zv(mode), zvd(mode)):
+        found = insensitivity(shaper, [mode])
+        assert found.high is None
+        edge = residual_vibration(shaper, mode, np.array([found.low * (1 - 1e-6), found.low * (1 + 1e-6)]))
+        assert edge[0] > 0.05 > edge[1]

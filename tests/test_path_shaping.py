@@ -19,6 +19,7 @@ from cnc_shape.motion import moving
 from cnc_shape.program import PathMode
 from cnc_shape.shapers import make_shaper, zv, zvd
 from cnc_shape.shapers.path_shaping import common_shaper, path_sampling
+from cnc_shape.shapers.shaper import NONE
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.timing import Timing
 from cnc_shape.toolpath import build_toolpath
@@ -54,6 +55,21 @@ def test_the_command_stays_on_the_path_and_ends_where_it_does(shaper):
     assert_allclose(shaped.position[-1], whole.target[-1], atol=1e-9)
     _, end = driven([whole], Timing(path_shaper=shaper))
     assert end == pytest.approx(profile.end_time + shaper.duration, abs=1e-12)
+
+
+def test_a_shaper_that_does_nothing_changes_nothing():
+    plain, end = driven([winding()], Timing())
+    shaped, shaped_end = driven([winding()], Timing(path_shaper=NONE))
+    assert shaped_end == end
+    for name in ("position", "velocity", "acceleration", "arc_length"):
+        assert_allclose(getattr(shaped, name), getattr(plain, name), atol=1e-9)
+
+
+def test_what_it_holds_back_is_a_shaper_long():
+    """Cells far behind are let go, however long the path is."""
+    profile = plan(smooth(build_toolpath(winding()), Smoothing(0.01)), LIMITS)
+    states = [state for state, _ in path_sampling(zv(Mode(42.0, 0.05)), T)(None, profile, True)]
+    assert len(states[-1].path) < 0.2 * len(profile.path)
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])

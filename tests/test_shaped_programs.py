@@ -428,7 +428,7 @@ def test_wrong_usage_is_told(place, capfd):
     assert "outside 0.001" in refused(capfd, "apply", "part.nc", "--tolerance-um", "nan")
     (place / "times.csv").write_text("time_s,x_mm\n0,0\n0.5,1\n")
     assert "its own times" in refused(capfd, "apply", "times.csv", "-o", "out.nc", "--respect-limits")
-    assert "not for live samples" in refused(capfd, "apply", "--stream", "--respect-limits")
+    assert "not for --stream" in refused(capfd, "apply", "--stream", "--respect-limits")
     assert "more than once" in refused(capfd, "apply", "-", "-o", "out.nc", "--respect-limits")
     assert sorted(path.name for path in place.iterdir()) == [
         "hatch.nc", "impatient.yaml", "part.nc", "times.csv",

@@ -89,6 +89,17 @@ def test_axes_are_delayed_to_the_largest_centroid():
     assert common_delay(shapers) == shapers["y"].delay
 
 
+@pytest.mark.parametrize("amplitudes", [[-1.0, 2.0], [2.0, -1.0]])
+def test_centroids_outside_the_impulses_keep_the_axes_in_step(amplitudes):
+    """Impulses of mixed signs can be late by more than their last one, or early."""
+    shapers = {"x": make_shaper([0.0, 0.0205], amplitudes)}
+    diagonal = straight(T, (1.0, 1.0, 0.0), 30.0, 0.3)
+    shaped = shape(diagonal, shapers)
+    steady = slice(80, len(diagonal))
+    assert_allclose(shaped.position[steady, 0], shaped.position[steady, 1], atol=1e-12)
+    assert common_delay(shapers) == max(shapers["x"].delay, 0.0)
+
+
 @pytest.mark.parametrize("chunk", [1, 2, 7, 50])
 def test_streamed_equals_whole_bit_for_bit(chunk):
     command = point_to_point(T)

@@ -50,6 +50,8 @@ def test_contour_shaping_is_the_best_of_all_kinds_on_the_bundled_sample():
     ):
         values = {name: pick(row) for name, row in rows.items()}
         assert values["contour_shaped"] < values["axis_shaped"] < values["path_shaped"] < values["unshaped"]
+    for row in rows.values():
+        assert row.worst.tool.rms == max(result.tool.rms for result in row.results) > row.nominal.tool.rms
     assert rows["contour_shaped"].contour_factors == {"x": 0.0, "y": 0.0}
     assert rows["axis_shaped"].contour_factors["x"] == pytest.approx(-0.643, abs=1e-3)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -79,6 +80,7 @@ def apply(
     from cnc_shape.cli.output import print_json, print_text, warn
     from cnc_shape.cli.progress import line_by_line, progress
     from cnc_shape.cli.reading import named_options
+    from cnc_shape.cli.slowed import slowed_down, slowed_json, slowed_notes
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.errors import OptionError
     from cnc_shape.opening import open_motion
@@ -98,14 +100,16 @@ def apply(
         raise OptionError("--tolerance-um is for programs: samples are exact", hint="write to OUT.nc")
     setup = load_machine(machine)
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
+    kind = setup.planning.shaping
+    slowed = slowed_down(file, setup, options, quiet=quiet or json)
+    timing = replace(setup.timing(kind), slowdown=slowed.slowdown if slowed else None)
     respect = None
     if respect_limits:
         with progress("planning", None, quiet=quiet or json):
-            respect = find_limits(file, setup, options)
-    kind = setup.planning.shaping
+            respect = find_limits(file, setup, options, timing)
     planner = respect.machine if respect else None
     with (
-        open_motion(file, setup, options, [setup.timing(kind)], planner=planner) as motion,
+        open_motion(file, setup, options, [timing], planner=planner) as motion,
         progress("applying", motion.lines, quiet=quiet or json) as advance,
     ):
         blocks = line_by_line(motion.blocks, advance)
@@ -114,9 +118,9 @@ def apply(
         written = _write(work, target, tolerance_um, remarks, force=force)
         done = work.summary()
     notes = applied.notes(done, setup, target if written else None, timed=motion.timed)
-    warn([*motion.warnings(), *notes], quiet=quiet)
+    warn([*motion.warnings(), *notes, *slowed_notes(slowed, setup)], quiet=quiet)
     if json:
-        print_json("apply", applied.result(done, target, written, respect, setup))
+        print_json("apply", applied.result(done, target, written, respect, setup) | slowed_json(slowed))
     elif target is not None:
         print_text(applied.text(done, target, written, respect, setup))
 

@@ -60,6 +60,7 @@ def simulate(
     from cnc_shape.cli.output import print_error, print_json, warn
     from cnc_shape.cli.progress import line_by_line, progress
     from cnc_shape.cli.reading import named_options
+    from cnc_shape.cli.slowed import slowed_down, slowed_json, slowed_notes
     from cnc_shape.config.bundled import bundled
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.opening import open_motion
@@ -70,15 +71,18 @@ def simulate(
     gates = [parse_gate(text) for text in fail_on or []]
     kind = _figure_format(figures)
     setup = load_machine(machine)
-    picked = (
-        default_cases(setup) if cases is None else pick_cases(setup, [c.strip() for c in cases.split(",")])
-    )
+    names = None if cases is None else [name.strip() for name in cases.split(",")]
+    picked = default_cases(setup) if names is None else pick_cases(setup, names)
     wanted = report or output is not None
     _check_wanted(wanted, all_signals=all_signals)
     if output is not None:
         _check_folder(Path(output), force=force)
     source = file if file is not None else str(bundled(SAMPLE))
     options = named_options(dialect, path, setup.tools, block_delete=block_delete, closed=closed)
+    slowed = slowed_down(source, setup, options, quiet=quiet or json)
+    if slowed is not None:
+        gentle = slowed.slowdown
+        picked = default_cases(setup, gentle) if names is None else pick_cases(setup, names, gentle)
     trade = Trade(setup) if wanted else None
     with (
         open_motion(source, setup, options, timings(picked), trade.timings if trade else ()) as motion,
@@ -97,11 +101,12 @@ def simulate(
             "simulate", motion.name, *(["--cases", cases] if cases else []),
             *(["--all-signals"] if all_signals else []),
         ]  # fmt: skip
-        context = report_context([source], setup, command, motion.warnings(by_name=True), kind)
+        told = [*motion.warnings(by_name=True), *slowed_notes(slowed, setup)]
+        context = report_context([source], setup, command, told, kind)
         page = _report(result, output, context, kinds, force=force)
-    warn(motion.warnings(), quiet=quiet)
+    warn([*motion.warnings(), *slowed_notes(slowed, setup)], quiet=quiet)
     if json:
-        extra: dict[str, Any] = {} if page is None else {"report": str(page)}
+        extra: dict[str, Any] = slowed_json(slowed) | ({} if page is None else {"report": str(page)})
         if kinds:
             from cnc_shape.report.trade_table import trade_json
 

@@ -101,7 +101,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     notes = (*_jerk_note(tree, axes), *_single_mode_notes(tree, machine, choices))
     setup = Setup(
         machine=machine,
-        planning=_planning(model.planning),
+        planning=_planning(source, tree, model.planning),
         control=_control(model.control),
         tools=_tools(source, tree, model),
         choices=choices,
@@ -233,7 +233,15 @@ def _control(model: ControlModel) -> Control:
     )
 
 
-def _planning(model: PlanningModel) -> Planning:
+def _planning(source: str, tree: Tree, model: PlanningModel) -> Planning:
+    tolerance = model.tool_tolerance_mm
+    if tolerance is not None and tolerance <= model.path_tolerance_mm:
+        place, _ = locate(tree, ("planning", "tool_tolerance_mm"))
+        reason = (
+            f"planning.tool_tolerance_mm: {tolerance:g} mm is not more than path_tolerance_mm, by which "
+            f"the path itself may leave the program ({model.path_tolerance_mm:g} mm)"
+        )
+        refuse(source, place, reason, "lower path_tolerance_mm, or allow the tool more")
     return Planning(
         path_tolerance=model.path_tolerance_mm,
         shaping=Shaping(model.shaping),

@@ -14,6 +14,7 @@ from cnc_shape.shapers.comparison import Design
 from cnc_shape.shapers.measures import ModelError
 
 RATIOS = np.linspace(0.5, 1.5, 51)  # -, actual over modelled frequency
+NOTHING = 1e-12  # s or s^2 a millimetre: below it the tool stays on the path whatever the axes do
 DAMPING_RATIOS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3)  # as in paper 000, Fig. 4
 
 
@@ -68,6 +69,19 @@ def design_json(
             "tolerance_mm": corner.tolerance,
             "acceleration_mm_s2": found.corner_acceleration(corner.tolerance),
         },
+        "tool": {
+            "curve_s2": found.tool.curve,
+            "stop_corner_s2": found.tool.stop,
+            "stop_corner_half_dwell_s2": found.tool.stop_half_dwell,
+            "corner_s": found.tool.corner_at_speed,
+            "tolerance_mm": corner.tolerance,
+            "curve_acceleration_mm_s2": _at_most(corner.tolerance, found.tool.curve),
+            "stop_corner_acceleration_mm_s2": _at_most(corner.tolerance, found.tool.stop),
+            "stop_corner_half_dwell_acceleration_mm_s2": _at_most(
+                corner.tolerance, found.tool.stop_half_dwell
+            ),
+            "corner_speed_mm_s": _at_most(corner.tolerance, found.tool.corner_at_speed),
+        },
     }
     if sensitivity:
         result["sensitivity"] = {
@@ -79,6 +93,11 @@ def design_json(
             ],
         }
     return result
+
+
+def _at_most(tolerance: float, ratio: float) -> float | None:
+    """What an axis may do so that the tool keeps a tolerance; None: anything."""
+    return tolerance / abs(ratio) if abs(ratio) > NOTHING * tolerance else None
 
 
 # how an option is said, where its name and value alone are not how one says it
@@ -130,8 +149,31 @@ def design_text(design: Design, options: Mapping[str, object], corner: Corner) -
             f"  a corner at {corner.speed:g} mm/s is cut by {cut:.3g} µm; "
             f"one with a stop keeps to {1e3 * corner.tolerance:g} µm at {with_stop}",
             f"  curve factor {curve} (tool error on a curve, of the unshaped one)",
+            *_tool_text(design, corner.tolerance),
         ]
     )
+
+
+def _tool_text(design: Design, tolerance: float) -> list[str]:
+    """What the axes may do so that the tool itself keeps the tolerance."""
+    if design.assessment.contour_factor is None:
+        return []
+    tool = design.assessment.tool
+    ratios = (tool.curve, tool.stop, tool.stop_half_dwell)
+    curve, stop, half = (_told(_at_most(tolerance, ratio), "mm/s²") for ratio in ratios)
+    speed = _told(_at_most(tolerance, tool.corner_at_speed), "mm/s")
+    pause = 500.0 * design.shaper.duration
+    return [
+        f"  the tool itself keeps to {1e3 * tolerance:g} µm on a curve at {curve}, at a corner with a stop",
+        f"  at {stop}, with a pause of {pause:.3g} ms there at {half}, and without a stop at {speed}",
+    ]
+
+
+def _told(value: float | None, unit: str) -> str:
+    if value is None:
+        return f"any {'speed' if unit == 'mm/s' else 'acceleration'}"
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:.0f} {unit}" if 1000.0 <= rounded < 1e7 else f"{rounded:g} {unit}"
 
 
 def _error_text(error: ModelError, design: Design, row: int) -> str:

@@ -28,7 +28,7 @@ from cnc_shape.kernels.taps import delayed_sum
 from cnc_shape.modes import Mode
 from cnc_shape.program import ROTARY
 from cnc_shape.shapers.shaper import NONE, Shaper
-from cnc_shape.trajectory import Trajectory, join_trajectories
+from cnc_shape.trajectory import Trajectory, with_past
 
 WIDTH_FACTOR = 2.5  # -, half width of the smoothing over sqrt(|gamma|): peak acceleration grows by <= 20 %
 MOST_TAPS = 200_000  # samples of a smoothing window
@@ -134,15 +134,10 @@ def compensating(gains: Mapping[str, float], sample_time: float) -> Step:
     def step(
         history: Trajectory | None, command: Trajectory, last: bool
     ) -> tuple[Trajectory | None, Trajectory]:
-        if history is None:
-            if len(command) == 0:
-                return None, command
-            history = command.resting(0, kept)
-        first = len(history)
-        whole = join_trajectories([history, command])
-        if last:
-            after = ceil(2.0 * width / sample_time - GRID_TOLERANCE)
-            whole = join_trajectories([whole, whole.resting(-1, after)])
+        if history is None and len(command) == 0:
+            return None, command
+        after = ceil(2.0 * width / sample_time - GRID_TOLERANCE) if last else 0
+        whole, first = with_past(history, command, kept, after)
         count = len(whole) - first
         gain = frozen([gains.get(axis, 0.0) for axis in whole.axes])
         offset = normal_offsets(whole.velocity, whole.acceleration, gain)

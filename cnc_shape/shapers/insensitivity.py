@@ -129,7 +129,8 @@ class _Curve:
         step = direction * min(LARGEST_STEP, 1.0 / (STEPS_PER_SWING * max(swings, 1e-9)))
         limit = LARGEST_FREQUENCY_RATIO if direction > 0.0 else 0.0
         found = np.full(len(self.times), inf)
-        rows, first = np.arange(len(self.times)), 1.0
+        rows = np.arange(len(self.times))
+        first = 1.0 if direction > 0.0 else self._calm_from(rows)
         while rows.size and (limit - first) * direction > 0.0:
             line: FloatArray = first + step * np.arange(BLOCK + 2, dtype=np.float64)
             line = np.clip(line, min(limit, 1.0), max(limit, 1.0))
@@ -141,6 +142,19 @@ class _Curve:
             if direction > 0.0:
                 rows = rows[~self._calm(rows, first)]
         return found
+
+    def _calm_from(self, rows: IntArray) -> float:
+        """A ratio from which on V of all shapers stays within the tolerance up to 1; 1 where it is not known.
+
+        Damping near 1 makes long shapers of many swings, and all of them are over where V is large.
+        """
+        calm, restless = 1.0, 0.0
+        if not self._calm(rows, calm).all():
+            return calm
+        for _ in range(HALVINGS):
+            middle = 0.5 * (calm + restless)
+            calm, restless = (middle, restless) if self._calm(rows, middle).all() else (calm, middle)
+        return calm
 
     def _calm(self, rows: IntArray, ratio: float) -> BoolArray:
         """Whether V stays within the tolerance from `ratio` on: (n,).

@@ -12,6 +12,7 @@ from cnc_shape.modes import Mode
 from cnc_shape.shapers.analysis import contour_factor, vibration
 from cnc_shape.shapers.insensitivity import Insensitivity, insensitivity
 from cnc_shape.shapers.shaper import Shaper
+from cnc_shape.shapers.tool_corner import ToolErrors, tool_errors
 
 ASSUMED_FREQUENCY_ERROR = 0.1  # -, relative, of a mode that does not say how uncertain it is
 FREQUENCY_SCAN, DAMPING_SCAN = 201, 9  # points over the uncertain range
@@ -38,6 +39,7 @@ class Assessment:
     contour_factor: float | None
     corner_per_speed: float  # s
     corner_per_acceleration: float  # s^2
+    tool: ToolErrors
 
     @property
     def worst_residual(self) -> float:
@@ -71,6 +73,7 @@ def assess(shaper: Shaper, modes: Sequence[Mode], tolerance: float) -> Assessmen
         contour_factor=contour_factor(shaper, modes),
         corner_per_speed=corner_cut(shaper, 1),
         corner_per_acceleration=0.5 * corner_cut(shaper, 2),
+        tool=tool_errors(shaper, modes),
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, IntArray, frozen
 from cnc_shape.kernels.taps import delayed_sum
 from cnc_shape.shapers.shaper import NONE, Shaper
-from cnc_shape.trajectory import Trajectory, join_trajectories
+from cnc_shape.trajectory import Trajectory, with_past
 
 GRID_TOLERANCE = 1e-9  # -, of a sample: an impulse this close to the grid lies on it
 
@@ -35,11 +35,7 @@ class Delays:
 
 
 def common_delay(shapers: Mapping[str, Shaper]) -> float:
-    """Largest centroid of all shapers, s, and 0 at least.
-
-    Negative impulses can put a centroid before 0, a command ahead of itself; an axis without a shaper, whose
-    centroid is 0, cannot follow it there.
-    """
+    """Largest centroid of all axes, s; that of an axis without a shaper is 0."""
     return max([0.0, *(shaper.delay for shaper in shapers.values())])
 
 
@@ -82,16 +78,11 @@ def shaping(
         history: Trajectory | None, command: Trajectory, last: bool
     ) -> tuple[Trajectory | None, Trajectory]:
         placed = delays(shapers, command.axes, sample_time, aligned=aligned)
-        kept = int(placed.whole.max(initial=0)) + 2
-        if history is None:
-            if len(command) == 0:
-                return None, command
-            history = command.resting(0, kept)
-        first = len(history)
-        whole = join_trajectories([history, command])
-        if last:
-            after = ceil(placed.longest / sample_time - GRID_TOLERANCE)
-            whole = join_trajectories([whole, whole.resting(-1, after)])
+        kept = max(int(placed.whole.max(initial=0)), int(placed.common / sample_time)) + 2
+        if history is None and len(command) == 0:
+            return None, command
+        after = ceil(placed.longest / sample_time - GRID_TOLERANCE) if last else 0
+        whole, first = with_past(history, command, kept, after)
         shaped = delayed_sum(
             whole.position, whole.velocity, whole.acceleration, first, len(whole) - first,
             placed.whole, placed.share, placed.amplitude, placed.impulses, sample_time,
