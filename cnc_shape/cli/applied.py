@@ -97,7 +97,7 @@ def notes(done: Applied, setup: Setup, program: Path | None, *, timed: bool = Fa
     """
     told = [] if setup.acting_shapers else ["this machine has no shapers: the command is written unshaped"]
     over = [
-        f"{axis.upper()} by {ratio - 1.0:.2%} in {what}"
+        f"{axis.upper()} by {100.0 * (ratio - 1.0):.2g} % in {what}"
         for axis, load in done.loads.items()
         for what, ratio in (("velocity", load.velocity), ("acceleration", load.acceleration))
         if ratio > KEPT

@@ -212,5 +212,5 @@ def _require(path: Path | str, proof: Proof, grid: Grid) -> None:
     raise OutputError(
         f"{path} does not read back as it was written: {apart / MICROMETRE:g} µm or millidegrees from the "
         f"command, {proof.time_difference:g} s longer",
-        hint="nothing was published; check the disk, and report this if it is sound",
+        hint="nothing was published; try a larger tolerance, or report this if the disk is sound",
     )
