@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 
 from cnc_shape.cli import run
 
@@ -23,3 +24,8 @@ def refused(capfd, *words: str) -> str:
     assert set(error) == {"code", "message", "file", "line", "column", "hint"}
     assert error["message"] in plain.err
     return plain.err
+
+
+def hearing_signals() -> None:
+    """Let a child be interrupted, even where the tests themselves run in the background and must not be."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

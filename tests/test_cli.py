@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from answers import hearing_signals
 
 from cnc_shape import __version__, cli
 from cnc_shape.cli import run
@@ -239,6 +240,7 @@ def test_signals_end_a_command_quietly(number: signal.Signals, status: int) -> N
         stderr=subprocess.PIPE,
         text=True,
         cwd=ROOT,
+        preexec_fn=hearing_signals,
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from answers import hearing_signals
 from commands import trapezoid
 from numpy.testing import assert_array_equal
 
@@ -232,7 +233,7 @@ def process(place):
     """The stream in a process of its own."""
     with subprocess.Popen(
         [sys.executable, "-m", "cnc_shape", "apply", "--stream"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, bufsize=0, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE, bufsize=0, env={**os.environ, "PYTHONPATH": str(ROOT)}, preexec_fn=hearing_signals,
     ) as started:  # fmt: skip
         yield started
         started.kill()
