@@ -8,7 +8,6 @@ shown for.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil, inf
 
@@ -67,13 +66,7 @@ class Slowed:
         )
 
 
-def slow_down(
-    path: str,
-    setup: Setup,
-    options: ReadingOptions,
-    tolerance: float,
-    advance: Callable[[Block], None] = lambda _: None,
-) -> Slowed:
+def slow_down(path: str, setup: Setup, options: ReadingOptions, tolerance: float) -> Slowed:
     """Find how gently each cell of a program has to be run through so that the tool keeps `tolerance` mm.
 
     Parameters
@@ -86,8 +79,6 @@ def slow_down(
         How to read the file.
     tolerance
         Largest contour error of the tool, mm.
-    advance
-        Told of every block.
 
     Raises
     ------
@@ -116,18 +107,18 @@ def slow_down(
         with open_motion(path, setup, options, [slowed]) as motion:
             for block in motion.blocks:
                 trace.advance(block)
-                advance(block)
         passes += 1
         unhurried = trace.cycle_time if passes == 1 else unhurried
-        reached = float(trace.error.max(initial=0.0))
-        excess = float(np.maximum(trace.error - tolerance, 0.0).sum())
+        error = trace.error()
+        reached = float(error.max(initial=0.0))
+        excess = float(np.maximum(error - tolerance, 0.0).sum())
         idle = idle + 1 if excess > PROGRESS * least else 0
         least = min(least, excess)
         if best is None or reached < best[0]:
             best = (reached, factor, trace.cycle_time)
         if reached <= tolerance:
             break
-        factor = factor * _gentler(trace, start, tolerance, setup, shaping)
+        factor = factor * _gentler(trace, error, start, tolerance, setup, shaping)
     assert best is not None
     reached, factor, cycle_time = best
     slowdown = None if (factor == 1.0).all() else Slowdown(frozen(factor))
@@ -151,19 +142,22 @@ class _Trace:
         self._places.append(block.command.arc_length)
         self._trial.advance(block)
 
-    @property
     def place(self) -> FloatArray:
         """Place of the command on the toolpath before shaping, (n,) mm."""
         return np.concatenate(self._places)
 
-    @property
     def error(self) -> FloatArray:
         """Largest contour error of the tool in any model at each sample of the shaped command, (m,) mm."""
         return np.concatenate(self._errors)
 
 
 def _gentler(
-    trace: _Trace, start: FloatArray, tolerance: float, setup: Setup, shaping: CommandShaping
+    trace: _Trace,
+    error: FloatArray,
+    start: FloatArray,
+    tolerance: float,
+    setup: Setup,
+    shaping: CommandShaping,
 ) -> FloatArray:
     """The next factor of every cell, from the errors of a pass.
 
@@ -176,7 +170,7 @@ def _gentler(
     slowest = max((m.damped_period for axis in setup.machine.axes for m in axis.modes), default=0.0)
     lag = 0.0 if trace.axes == () else shaping.lag(trace.axes, period)
     half = shaping.longer(trace.axes, period) / 2.0
-    error, place = trace.error, trace.place
+    place = trace.place()
     wanted = np.ones(error.size)
     far = error > tolerance
     wanted[far] = np.clip(AIM * tolerance / error[far], GENTLEST, AIM)

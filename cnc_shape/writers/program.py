@@ -19,6 +19,7 @@ from math import floor, log10
 from pathlib import Path
 
 from cnc_shape.arrays import FloatArray
+from cnc_shape.chunks import with_last
 from cnc_shape.errors import OutputError
 from cnc_shape.trajectory import Trajectory
 from cnc_shape.units import MICROMETRE
@@ -125,7 +126,7 @@ def stream_program(
     hasten: CreepStep | None = None
     here: Place | None = None
     text: _Text | None = None
-    for block, last in _with_end(blocks):
+    for block, last in with_last(blocks):
         hasten = hasten or without_creep(block.axes, block.sample_time, grid)
         text = text or _Text(write, block.axes, block.sample_time, grid, remarks)
         found, knots = find(found, block, last)
@@ -135,15 +136,6 @@ def stream_program(
         raise ValueError("a command without a single block is no program")
     write(b"G94\nM2\n")
     return text.segments, text.rests
-
-
-def _with_end(blocks: Iterable[Trajectory]) -> Iterator[tuple[Trajectory, bool]]:
-    """Pair each block with whether it is the last, which is an empty one."""
-    block: Trajectory | None = None
-    for block in blocks:
-        yield block, False
-    if block is not None:
-        yield block.cut(slice(0, 0)), True
 
 
 class _Text:
