@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from archives import arrays_of
 from numpy.testing import assert_allclose
 from programs import chunks
 
@@ -71,7 +72,7 @@ def test_chunks_of_any_size_give_the_same_bits(rows):
 
 
 def test_points_are_in_the_units_of_the_door():
-    file = np.load(
+    file = arrays_of(
         io.BytesIO(points_file([points_of(part) for part in chunks(PART, how=ReadingOptions(rows=2))]))
     )
     assert file["kind"].tolist() == [0, 1, 2, 1, 1]  # the dwell is no move
@@ -83,5 +84,5 @@ def test_points_are_in_the_units_of_the_door():
 
 
 def test_points_of_no_moves():
-    file = np.load(io.BytesIO(points_file([points_of(part) for part in chunks("M2\n")])))
+    file = arrays_of(io.BytesIO(points_file([points_of(part) for part in chunks("M2\n")])))
     assert file["end"].shape == (0, 6)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from archives import arrays_of
 
 from cnc_shape.cli import run
 
@@ -69,7 +70,7 @@ def test_points_are_written_and_replaced(part, tmp_path, capsys):
     points = tmp_path / "out.npz"
     for _ in range(2):
         assert ask(capsys, part, "--points", points)[0] == 0
-    file = np.load(points)
+    file = arrays_of(points)
     assert sorted(file) == ["end", "feed_mm_min", "kind", "length_mm", "line", "sweep_rad"]
     assert file["end"].shape == (3, 6)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from answers import answer, refused
+from archives import arrays_of
 from numpy.testing import assert_allclose
 
 from cnc_shape.cli import run
@@ -67,7 +68,7 @@ def test_the_run_folder_holds_what_the_table_says_and_is_the_same_to_the_byte(pl
     )
     for name in files:
         assert (place / "one" / name).read_bytes() == (place / "two" / name).read_bytes(), name
-    signals = np.load(place / "one" / "signals.npz")
+    signals = arrays_of(place / "one" / "signals.npz")
     worst = signals["shaped/tool_contour_error_mm"].max()
     assert_allclose(1e3 * worst, result["cases"][1]["tool_contour_max_um"], rtol=1e-12)
 
@@ -85,7 +86,7 @@ def test_all_signals_are_asked_for_with_a_report(place, capfd, monkeypatch):
         "samples"
     ]
     for name, fewest, most in (("few", 8, 32), ("all", samples, samples)):
-        signals = np.load(place / name / "signals.npz")
+        signals = arrays_of(place / name / "signals.npz")
         assert fewest <= signals["unshaped/time_s"].size <= most
         assert (signals["unshaped/decimation"] == 1) == (name == "all")
     assert json.loads((place / "all" / "run.json").read_text())["command"][-1] == "--all-signals"
@@ -224,7 +225,7 @@ def test_apply_says_what_simulate_says(place, capfd):
     applied = answer(capfd, "apply", "part.nc", "-o", "out.npz")
     assert_allclose(applied["command_contour_max_um"], shaped["command_contour_max_um"], rtol=1e-9)
     assert_allclose(applied["shaped_time_s"], shaped["cycle_time_s"], rtol=1e-12)
-    archive = np.load(place / "out.npz")
+    archive = arrays_of(place / "out.npz")
     assert next(iter(archive)) in ("time_s", "linear_axes")
     assert archive["position_mm"].shape == (applied["samples"], 3)
 

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from archives import arrays_of
 from numpy.testing import assert_allclose
 from programs import attempt, attempt_file
 
@@ -59,7 +60,7 @@ def test_real_programs(shared, name):
         low, high = want["bbox_end_points_mm"]
         assert_allclose(census.low, low, atol=1e-9)
         assert_allclose(census.high, high, atol=1e-9)
-    reference = np.load(folder / f"{name}.expected.npz")
+    reference = arrays_of(folder / f"{name}.expected.npz")
     ours = {column: np.concatenate([part[column] for part in rows]) for column in rows[0]}
     assert_moves(ours, *(reference[column] for column in ("kind", "end", "length_mm", "feed_mm_min")))
 

@@ -9,6 +9,7 @@ import naive
 import numpy as np
 import pytest
 from answers import answer, refused
+from archives import arrays_of
 from commands import part, point_to_point, straight
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -386,7 +387,7 @@ def test_a_time_trajectory_becomes_a_program(place, capfd):
     (place / "times.csv").write_text("time_s,x_mm,a_deg\n" + rows)
     result = answer(capfd, "apply", "times.csv", "-o", "times.nc")
     answer(capfd, "apply", "times.csv", "-o", "times.npz")
-    archive = np.load(place / "times.npz")
+    archive = arrays_of(place / "times.npz")
     position = np.hstack([archive["position_mm"], np.deg2rad(archive["position_deg"])])
     assert_follows((place / "times.nc").read_text(), command_of(position, ("x", "y", "z", "a")), 1e-3)
     assert 0.0 < result["program_deviation_mdeg"] <= 1.0
@@ -446,7 +447,7 @@ def test_negative_impulses_exceed_limits_and_say_so(place, capfd, file, least):
     ratios = [ratio for axis in result["limits"].values() for ratio in axis.values()]
     assert max(ratios) == pytest.approx(result["shaped_acceleration_ratio"])
     archive = answer(capfd, "apply", file, "-m", "impatient.yaml", "-o", "out.npz")["output"]
-    signals = np.load(place / archive)
+    signals = arrays_of(place / archive)
     for k, axis in enumerate("xy"):
         want = np.abs(signals["acceleration_mm_s2"][:, k]).max() / 3000.0
         assert result["limits"][axis]["acceleration_ratio"] == pytest.approx(want)
