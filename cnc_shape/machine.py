@@ -47,6 +47,7 @@ class Machine:
 
     name: str
     axes: tuple[Axis, ...]
+    joints: tuple[Drive, ...] = ()  # drives of a machine whose joints are not its axes; (): those of the axes
 
     def axis(self, name: str) -> Axis:
         """Return the axis called `name`; an axis the machine lacks is ideal, without travel limits."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from cnc_shape.controllers import Control
+from cnc_shape.kinematics import Kinematics, cartesian
 from cnc_shape.machine import Machine
 from cnc_shape.shapers import Shaper
 from cnc_shape.shapers.command_shaping import CommandShaping
@@ -44,6 +45,14 @@ class ShaperChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class KinematicsChoice:
+    """How the file asks for a kinematics: its name in `KINEMATICS`, and its parameters by their keys."""
+
+    type: str = "cartesian"
+    options: Mapping[str, object] = field(default_factory=dict[str, object])
+
+
+@dataclass(frozen=True, slots=True)
 class Setup:
     """A machine, its loop, its shapers and its tools.
 
@@ -56,6 +65,8 @@ class Setup:
     tools: tuple[Tool, ...] = ()
     choices: Mapping[str, ShaperChoice] = field(default_factory=dict[str, ShaperChoice])  # axis: choice
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper], compare=False)  # axis: designed
+    kinematics_choice: KinematicsChoice = KinematicsChoice()
+    kinematics: Kinematics = field(default_factory=cartesian, compare=False)
     warnings: tuple[str, ...] = field(default=(), compare=False)
     source: str = field(default="", compare=False)
 

@@ -1,7 +1,7 @@
 """The terms of the servo loop, one file each; the loop is their sum."""
 
 from cnc_shape.controllers.control import Control
-from cnc_shape.controllers.cross_coupling import CrossCoupling
+from cnc_shape.controllers.cross_coupling import CrossCoupling, Estimator, Form
 from cnc_shape.controllers.feedforward import Feedforward
 
-__all__ = ["Control", "CrossCoupling", "Feedforward"]
+__all__ = ["Control", "CrossCoupling", "Estimator", "Feedforward", "Form"]

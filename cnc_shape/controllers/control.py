@@ -17,3 +17,5 @@ class Control:
     delay_samples: int = 0  # the drive hears its command this many samples late
     feedforward: Feedforward | None = None
     cross_coupling: CrossCoupling | None = None
+    jacobian_every: int = 1  # samples for which the loop keeps the Jacobian of a commanded pose
+    joint_gains: tuple[float, ...] = ()  # 1/s, position gain of every joint; (): `position_gain` for all

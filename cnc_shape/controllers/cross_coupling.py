@@ -8,17 +8,38 @@ the paper writes as n <n, e>, without its 0/0 where the error lies along the pat
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.kernels import kernel
 
 
+class Estimator(Enum):
+    """How the loop guesses where the nearest point of the path is."""
+
+    TANGENT = 0  # on the tangent at the commanded point
+    CIRCLE = 1  # on the circle of curvature at the commanded point
+    FOOT_POINT = 2  # on the programmed path itself
+
+
+class Form(Enum):
+    """What the controller acts on."""
+
+    VECTOR = 0  # the contour error as a vector
+    SCALAR = 1  # its length, along its direction: unsigned, as the paper has it
+
+
 @dataclass(frozen=True, slots=True)
 class CrossCoupling:
-    """Proportional cross-coupling with the tangent estimator."""
+    """PID control of the estimated contour error, added to the velocity commands."""
 
     proportional: float  # 1/s
+    estimator: Estimator = Estimator.TANGENT
+    integral: float = 0.0  # 1/s^2
+    derivative: float = 0.0  # -
+    form: Form = Form.VECTOR
+    orientation: float = 0.0  # 1/s, of the rotary part of the tracking error
 
 
 class CrossCouplingGains(NamedTuple):

@@ -1,4 +1,9 @@
-"""The contract of a kinematics: where the drives stand when the tool is at a pose, and back."""
+"""The contract of a kinematics: where the drives stand when the tool is at a pose, and back.
+
+A pose is given by axes: x, y, z of the tool centre point first, then the rotary axes that the kinematics
+turns the tool or the workpiece with. The loop takes all it needs from here as arrays, so a new
+kinematics is its file and a line in `KINEMATICS`.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +15,16 @@ from cnc_shape.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:
-    """Forward and inverse transform, vectorised over time."""
+    """Forward and inverse transform and the inverse Jacobian, vectorised over time.
+
+    There are as many joints as axes. Rows of poses that the machine cannot reach come back as nan.
+    """
 
     name: str
-    forward: Callable[[FloatArray], FloatArray]  # joints (n,j) -> axes (n,d)
+    axes: tuple[str, ...]  # x, y, z first, then rotary axes
+    joints: tuple[str, ...]  # names of the drives: q1, q2, ...
+    forward: Callable[[FloatArray, FloatArray], FloatArray]  # joints (n,j), poses nearby (n,d) -> axes (n,d)
     inverse: Callable[[FloatArray], FloatArray]  # axes (n,d) -> joints (n,j)
+    inverse_jacobian: Callable[[FloatArray], FloatArray]  # axes (n,d) -> joint rates per axis rates (n,j,d)
+    turn: Callable[[FloatArray, FloatArray], FloatArray] | None = None  # axes, axes (n,d) -> angle between
+    # the tool's directions against the workpiece, (n,) rad; None: the tool does not turn
