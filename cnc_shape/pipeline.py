@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, sqrt
+from math import sqrt
 from typing import Protocol
 
 import numpy as np
@@ -34,10 +34,8 @@ from cnc_shape.recording import Outline, Recorder, Signals
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.simulation import SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
+from cnc_shape.windows import foot_reach
 
-WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
-WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
-WINDOW_AHEAD = 1.5  # of the position loop's time constant 1/Kp
 SLOWEST_LOOP = 2.5  # s, time constant beyond which the window grows no more
 
 
@@ -63,15 +61,6 @@ class Deviation:
 def deviation(found: Tally) -> Deviation:
     """What a tally has found."""
     return Deviation(found.rms, found.max, found.line)
-
-
-def window(settling: float, longest: float, sample_time: float) -> tuple[int, int]:
-    """Samples back and ahead of its own within which a sample's place on the path is sought.
-
-    settling: time constant of the position loop, s, 0 for ideal drives; longest: of the shapers' delays, s.
-    """
-    back, ahead = WINDOW_BACK * settling + longest, WINDOW_AHEAD * settling + longest
-    return ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1
 
 
 def settling_time(machine: Machine, control: Control) -> float:
@@ -137,8 +126,8 @@ class Trial:
         self._shape = command_shaping(case.shaping, axes, period)
         self._simulate = simulating(machine, case.control)
         self._longer = case.shaping.longer(axes, period)
-        reach = window(settling_time(machine, case.control), self._longer, period)
-        self._measure = measuring(*reach, WINDOW_MARGIN)
+        reach = foot_reach(settling_time(machine, case.control), self._longer, period)
+        self._measure = measuring(reach)
         self._shaped: CommandState | None = None
         self._simulated: SimulationState | None = None
         self._measured: MeasuringState | None = None

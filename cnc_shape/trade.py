@@ -19,13 +19,14 @@ from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.errors import OptionError
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import Block
-from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, settling_time, window
+from cnc_shape.pipeline import Deviation, deviation, settling_time
 from cnc_shape.program import ROTARY
 from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.shapers.shaper import NONE as UNSHAPED
 from cnc_shape.simulation import Response, SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
+from cnc_shape.windows import foot_reach
 
 KINDS = {
     Shaping.NONE: "unshaped",
@@ -190,8 +191,8 @@ class ModelTrial:
         self._longer = self._how.longer(axes, period)
         self._shape = command_shaping(self._how, axes, period)
         self._simulate = [simulating(off_by(machine, model), self._control) for model in self._models]
-        reach = window(settling_time(machine, self._control), self._longer, period)
-        self._measure = measuring(*reach, WINDOW_MARGIN)
+        reach = foot_reach(settling_time(machine, self._control), self._longer, period)
+        self._measure = measuring(reach)
 
 
 def _timings(setup: Setup) -> dict[Shaping, Timing]:

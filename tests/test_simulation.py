@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, line, toolpath
 from scipy import signal
 
-from cnc_shape.contour import contour_error, foot_windows
+from cnc_shape.contour import contour_error
 from cnc_shape.controllers import Control, CrossCoupling, Feedforward
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.limits import Limits
@@ -24,6 +24,7 @@ from cnc_shape.shapers import make_shaper, zv, zvd
 from cnc_shape.shapers.analysis import phasor
 from cnc_shape.shapers.shaping import shape
 from cnc_shape.simulation import simulate, simulating
+from cnc_shape.windows import foot_windows
 
 LIMITS = Limits(1000.0, 10_000.0)
 T = 1e-3
