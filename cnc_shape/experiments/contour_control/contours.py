@@ -20,7 +20,8 @@ from cnc_shape.program import XYZ, Motion, PathMode, Program, vertical_normals
 from cnc_shape.toolpath import Toolpath, build_toolpath
 
 FEED_RATE: Final = 16.0  # mm/s, the paper's F
-CHORD_ERROR: Final = 0.5e-6  # mm, of the lines that stand for a curve in a toolpath
+FINE: Final = 0.5e-6  # mm, by which lines that stand for a curve in a toolpath leave it
+LEAD_OUT: Final = 2.0  # mm of a closed contour's beginning that follow its end
 STRAIGHT: Final = 100.0  # mm, radius from which on a curve counts as one of that radius
 TABLE: Final = 40_000  # places of a curve where its arc length is known
 
@@ -65,11 +66,18 @@ class Contour:
     length: float  # mm
     at: Callable[[FloatArray], Places]  # arc length (n,) mm -> points
     corners: tuple[float, ...]  # mm, places where the direction jumps
-    moves: Callable[[], Moves]  # the same as a program has it
+    closed: bool
+    moves: Callable[
+        [float, float], Moves
+    ]  # as a program has it up to a place, mm, curves as lines that leave
+    # them by an error, mm
 
     def toolpath(self) -> Toolpath:
-        """The contour as programmed: lines and arcs exact, other curves as fine lines."""
-        moves = self.moves()
+        """The contour as programmed: lines and arcs exact, other curves as fine lines.
+
+        A closed one goes on into its beginning, so that overshoot at the end is no contour error.
+        """
+        moves = self.moves(self.length + self.closed * LEAD_OUT, FINE)
         count = len(moves.motion)
         nan = frozen(np.full(count, np.nan))
         return build_toolpath(
@@ -92,11 +100,12 @@ class Contour:
         )
 
 
-def circle(name: str, radius: float, laps: float = 1.0, pitch: float = 0.0) -> Contour:
+def circle(name: str, radius: float, laps: int = 1, pitch: float = 0.0) -> Contour:
     """Counter-clockwise about the origin from (radius, 0, 0); with a pitch (mm a lap) a helix."""
     climb = pitch / (2.0 * np.pi)  # mm a radian
     slant = float(np.hypot(radius, climb))  # mm of path a radian
-    angle = 2.0 * np.pi * laps
+    turn = 2.0 * np.pi
+    angle = turn * laps
 
     def at(arc_length: FloatArray) -> Places:
         phi = arc_length / slant
@@ -107,35 +116,41 @@ def circle(name: str, radius: float, laps: float = 1.0, pitch: float = 0.0) -> C
             frozen(np.column_stack([-cosine, -sine, 0.0 * one]) * (radius / slant**2)),
         )
 
-    def moves() -> Moves:
-        end = np.array([[radius * np.cos(angle), radius * np.sin(angle), climb * angle]])
-        return Moves([Motion.ARC], end, np.zeros((1, 3)), np.array([angle]))
+    def moves(until: float, chord_error: float) -> Moves:
+        del chord_error  # arcs are exact
+        ends = laid_out(slant * angle, [slant * turn * lap for lap in range(1, laps)], until)
+        target, start = at(ends[1:]).position, at(ends[:-1]).position
+        center = start * np.array([0.0, 0.0, 1.0])
+        return Moves([Motion.ARC] * len(target), target, center, np.diff(ends) / slant)
 
-    return Contour(name, slant * angle, at, (), moves)
+    return Contour(name, slant * angle, at, (), pitch == 0.0, moves)
 
 
-def polygon(name: str, corners: Sequence[Sequence[float]]) -> Contour:
-    """Straight lines through `corners`, (x, y) mm each."""
-    points = np.array([(x, y, 0.0) for x, y in corners])
+def polygon(name: str, vertices: Sequence[Sequence[float]]) -> Contour:
+    """Straight lines through `vertices`, (x, y) mm each."""
+    points = np.array([(x, y, 0.0) for x, y in vertices])
     side = np.diff(points, axis=0)
     size = np.linalg.norm(side, axis=1)
     direction = side / size[:, None]
     place = np.concatenate([[0.0], np.cumsum(size)])
+    length, corners = float(place[-1]), tuple(place[1:-1].tolist())
+    closed = bool((points[0] == points[-1]).all())
 
     def at(arc_length: FloatArray) -> Places:
+        arc_length = _wrapped(arc_length, length) if closed else arc_length
         row = np.clip(np.searchsorted(place, arc_length, side="right") - 1, 0, len(size) - 1)
         position = points[row] + (arc_length - place[row])[:, None] * direction[row]
         return Places(frozen(position), frozen(direction[row]), frozen(np.zeros_like(position)))
 
-    def moves() -> Moves:
-        none = np.zeros((len(size), 3))
-        return Moves([Motion.FEED] * len(size), points[1:], none, none[:, 0])
+    def moves(until: float, chord_error: float) -> Moves:
+        del chord_error  # lines are exact
+        return _lines(at(laid_out(length, corners, until)[1:]).position)
 
-    return Contour(name, float(place[-1]), at, tuple(place[1:-1].tolist()), moves)
+    return Contour(name, length, at, corners, closed, moves)
 
 
 def curve(name: str, of: Callable[[FloatArray, int], FloatArray], knots: FloatArray) -> Contour:
-    """A smooth plane curve by its parameter.
+    """A closed smooth plane curve by its parameter.
 
     Parameters
     ----------
@@ -153,8 +168,10 @@ def curve(name: str, of: Callable[[FloatArray, int], FloatArray], knots: FloatAr
     place = np.concatenate([[0.0], np.cumsum(half * (speed @ weights))])
     parameter = CubicHermiteSpline(place, u, 1.0 / np.linalg.norm(of(u, 1), axis=1))
 
+    length = float(place[-1])
+
     def at(arc_length: FloatArray) -> Places:
-        w = np.clip(parameter(arc_length), u[0], u[-1])
+        w = np.clip(parameter(_wrapped(arc_length, length)), u[0], u[-1])
         first, second = of(w, 1), of(w, 2)
         speed_v2 = (first**2).sum(axis=1)[:, None]
         curvature = second / speed_v2 - first * ((first * second).sum(axis=1)[:, None] / speed_v2**2)
@@ -162,12 +179,28 @@ def curve(name: str, of: Callable[[FloatArray, int], FloatArray], knots: FloatAr
             _in_space(of(w, 0)), _in_space(first / np.sqrt(speed_v2)), _in_space(curvature)
         )  # fmt: skip
 
-    def moves() -> Moves:
-        target = at(chord_ends(at, float(place[-1]), CHORD_ERROR)[1:]).position
-        none = np.zeros_like(target)
-        return Moves([Motion.FEED] * len(target), target, none, none[:, 0])
+    def moves(until: float, chord_error: float) -> Moves:
+        ends = laid_out(length, chord_ends(at, length, chord_error)[1:-1].tolist(), until)
+        return _lines(at(ends[1:]).position)
 
-    return Contour(name, float(place[-1]), at, (), moves)
+    return Contour(name, length, at, (), True, moves)
+
+
+def laid_out(length: float, between: Sequence[float], until: float) -> FloatArray:
+    """Places where the moves of a contour end, its start first, its own end among them, up to `until` mm."""
+    lap = np.array([0.0, *between, length])
+    again = length + lap[1:]
+    return frozen(np.concatenate([lap, again[again < until], [until][: until > length]]))
+
+
+def _wrapped(arc_length: FloatArray, length: float) -> FloatArray:
+    """Arc length on a closed contour: past its end it begins anew."""
+    return np.where(arc_length > length, arc_length - length, arc_length)
+
+
+def _lines(target: FloatArray) -> Moves:
+    none = np.zeros_like(target)
+    return Moves([Motion.FEED] * len(target), target, none, none[:, 0])
 
 
 def divided(edges: FloatArray, parts: Callable[[float], int]) -> FloatArray:
@@ -229,10 +262,10 @@ def contours() -> Mapping[str, Contour]:
     every = (
         fan(),
         circle("circle20", 20.0),
-        circle("circle5", 5.0, laps=3.0),
+        circle("circle5", 5.0, laps=3),
         polygon("diamond", DIAMOND),
         polygon("corner", CORNER),
         lemniscate(30.0),
-        circle("helix", 20.0, laps=2.0, pitch=10.0),
+        circle("helix", 20.0, laps=2, pitch=10.0),
     )
     return {contour.name: contour for contour in every}
