@@ -10,14 +10,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cnc_shape.arrays import FloatArray
+from cnc_shape.arrays import FloatArray, frozen
+
+WEIGHT_OF_A_RADIAN = 60.0  # mm
 
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:
     """Forward and inverse transform and the inverse Jacobian, vectorised over time.
 
-    There are as many joints as axes. Rows of poses that the machine cannot reach come back as nan.
+    There are as many joints as axes. A joint that cannot reach its pose is nan, and so is every axis of
+    a pose that cannot be found from its joints. Forward takes each row's own pose nearby as first guess, so
+    what comes of a row depends on no other row.
     """
 
     name: str
@@ -28,3 +32,17 @@ class Kinematics:
     inverse_jacobian: Callable[[FloatArray], FloatArray]  # axes (n,d) -> joint rates per axis rates (n,j,d)
     turn: Callable[[FloatArray, FloatArray], FloatArray] | None = None  # axes, axes (n,d) -> angle between
     # the tool's directions against the workpiece, (n,) rad; None: the tool does not turn
+    radian: float = WEIGHT_OF_A_RADIAN  # mm that count as much as a radian where both stand in one norm
+
+
+def rows(values: FloatArray, width: int) -> FloatArray:
+    """Return `values` (n, width) as kernels take them: read-only, in one piece.
+
+    Raises
+    ------
+    ValueError
+        If they are not rows of that width.
+    """
+    if values.ndim != 2 or values.shape[1] != width:
+        raise ValueError(f"{values.shape=}, not (n, {width})")
+    return frozen(values)
