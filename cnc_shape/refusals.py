@@ -63,7 +63,9 @@ def _own(joints: Joints, pose: FloatArray) -> FloatArray:
     return frozen(pose[:, : joints.coupled])
 
 
-def refuse_divergence(joints: Joints, ran: Ticks, start: float, sample_time: float, source: str) -> None:
+def refuse_divergence(
+    joints: Joints, reference: FloatArray, ran: Ticks, start: float, sample_time: float, source: str
+) -> None:
     """Stop where the loop has left all bounds.
 
     Parameters
