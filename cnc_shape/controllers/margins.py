@@ -19,8 +19,8 @@ from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.loop_model import LoopModel, loop_model, loop_transfer
 from cnc_shape.machine import Drive
 
-GRID = 240  # frequencies, evenly on a logarithmic scale up to half the sample rate
-SLOWEST = 1e-3  # of the highest position gain: where the grid begins
+GRID = 160  # frequencies, evenly on a logarithmic scale up to half the sample rate
+SLOWEST = 1e-2  # of the highest position gain: where the grid begins
 REFINED = 5  # times, each by REFINEMENT
 REFINEMENT = 8
 NEAR = 1e-3  # - and rad: eigenvalues this near to a crossing cross there
@@ -73,10 +73,11 @@ def _margins(model: LoopModel) -> Margins:
     grid = np.geomspace(slowest, end * (1.0 - 1e-9), GRID)
     loci = _loci(model, grid)
     # at half the sample rate the loop is real: a curve may end on the negative axis without crossing it
-    last = np.linalg.eigvals(loop_transfer(model, np.array([-1.0 + 0.0j]))[0, 0])
+    last = _loci_at(model, np.array([-1.0 + 0.0j]))[0]
     gains, phases, delays = [np.inf], [np.inf], [np.inf]
     gains.extend((-1.0 / last.real[(last.real < 0.0) & (last.real > -1.0)]).tolist())
-    for frequency in _crossings(model, grid, loci, _over_negative_axis):
+    opposed = _crossings(model, grid, loci, _over_negative_axis)
+    for frequency in opposed:
         here = _loci(model, np.array([frequency]))[0]
         size = np.abs(here)[np.abs(np.angle(-here)) < NEAR]
         gains.extend((1.0 / size[size < 1.0]).tolist())
@@ -86,26 +87,28 @@ def _margins(model: LoopModel) -> Margins:
         angle = np.angle(-here)[np.abs(np.abs(here) - 1.0) < NEAR]
         phases.extend(np.abs(angle).tolist())
         delays.extend((np.mod(angle, 2.0 * np.pi) / frequency).tolist())
-    return Margins(min(gains), min(phases), _sensitivity(model, np.union1d(grid, turned)), min(delays))
+    watched = np.sort(np.concatenate([grid, opposed, turned]))
+    return Margins(min(gains), min(phases), _sensitivity(model, watched), min(delays))
 
 
 def _loci(model: LoopModel, frequencies: FloatArray) -> Eigenvalues:
     """Eigenvalues of L at frequencies (f,) rad/s, (f,j)."""
-    transfer = loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0]
-    return np.linalg.eigvals(transfer).astype(np.complex128)
+    return _loci_at(model, np.exp(1j * model.sample_time * frequencies))
+
+
+def _loci_at(model: LoopModel, z: NDArray[np.complex128]) -> Eigenvalues:
+    return np.asarray(np.linalg.eigvals(loop_transfer(model, z)[0]), dtype=np.complex128)
 
 
 def _crossings(
     model: LoopModel, grid: FloatArray, loci: Eigenvalues, over: Callable[[Eigenvalues], BoolArray]
 ) -> list[float]:
     """Frequencies at which an eigenvalue passes `over` a line, rad/s."""
-    brackets = [(grid[i], grid[i + 1]) for i in np.flatnonzero(over(loci))]
+    brackets = [grid[i : i + 2] for i in np.flatnonzero(over(loci))]
     for _ in range(REFINED):
-        finer = [np.linspace(low, high, REFINEMENT + 1) for low, high in brackets]
-        brackets = [
-            (inner[i], inner[i + 1]) for inner in finer for i in np.flatnonzero(over(_loci(model, inner)))
-        ]
-    return [float(0.5 * (low + high)) for low, high in brackets]
+        finer: list[FloatArray] = [np.linspace(low, high, REFINEMENT + 1) for low, high in brackets]
+        brackets = [inner[i : i + 2] for inner in finer for i in np.flatnonzero(over(_loci(model, inner)))]
+    return [float(bracket.mean()) for bracket in brackets]
 
 
 def _over_unit_circle(loci: Eigenvalues) -> BoolArray:
@@ -135,13 +138,15 @@ def _sensitivity(model: LoopModel, grid: FloatArray) -> float:
 
     def size(frequencies: FloatArray) -> FloatArray:
         transfer = loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0]
-        return 1.0 / np.linalg.svd(identity + transfer, compute_uv=False)[:, -1]
+        smallest = np.linalg.svd(identity + transfer, compute_uv=False)[:, -1]
+        return np.asarray(1.0 / smallest, dtype=np.float64)
 
     sizes = size(grid)
     largest = sizes.max()
     for _ in range(REFINED):
         top = int(np.argmax(sizes))
-        grid = np.linspace(grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)], 2 * REFINEMENT + 1)
+        around = grid[max(top - 1, 0) : top + 2]
+        grid = np.linspace(float(around[0]), float(around[-1]), 2 * REFINEMENT + 1)
         sizes = size(grid)
         largest = max(largest, sizes.max())
     return float(largest)
