@@ -74,9 +74,9 @@ def rows() -> Iterator[Row]:
     def run() -> None:
         state = None
         for block in blocks:
-            state, _ = step(state, block, block is blocks[-1])
+            state, _ = step(state, None, block, block is blocks[-1])
 
-    _, response = step(None, motion, True)
+    _, response = step(None, None, motion, True)
     assert np.allclose(response.position[:STEPS], loop_in_python(position, velocity), atol=1e-9)
     ours = best_of(ROUNDS, run) / len(motion)
     peer = best_of(2, partial(loop_in_python, position, velocity)) / STEPS

@@ -183,7 +183,7 @@ def test_following_error_of_a_ramp_is_feed_over_gain(kp):
 def residual(command, mode, sample_time, shaper=None):
     ideal = Machine("m", tuple(Axis(a, LIMITS, modes=(mode,) if a == "x" else ()) for a in "xyz"))
     shaped = command if shaper is None else shape(command, {"x": shaper})
-    state, _ = simulating(ideal, Control(sample_time))(None, shaped, True)
+    state, _ = simulating(ideal, Control(sample_time))(None, None, shaped, True)
     return state.residual[0]
 
 
@@ -231,10 +231,10 @@ def test_streamed_equals_whole_bit_for_bit(chunk):
     step, state, parts = simulating(stage, loop), None, []
     for low in range(0, len(command), chunk):
         high = min(low + chunk, len(command))
-        state, out = step(state, part(command, low, high), high == len(command))
+        state, out = step(state, None, part(command, low, high), high == len(command))
         parts.append(out)
-    assert step(None, part(command, 0, 5), False)[0].settling.shape == (0, 3)
-    state_whole, whole = step(None, command, True)
+    assert step(None, None, part(command, 0, 5), False)[0].settling.shape == (0, 3)
+    state_whole, whole = step(None, None, command, True)
     for name in ("joint", "tool", "drive"):
         assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(whole, name))
     assert_array_equal(state.settling, state_whole.settling)
@@ -243,9 +243,9 @@ def test_streamed_equals_whole_bit_for_bit(chunk):
 def test_an_empty_last_chunk_changes_nothing():
     command = circling(T, 5.0, 50.0, 0.3)
     step = simulating(machine(), Control(T))
-    state, first = step(None, command, False)
-    state, rest = step(state, part(command, len(command), len(command)), True)
-    _, whole = step(None, command, True)
+    state, first = step(None, None, command, False)
+    state, rest = step(state, None, part(command, len(command), len(command)), True)
+    _, whole = step(None, None, command, True)
     assert_array_equal(np.concatenate([first.tool, rest.tool]), whole.tool)
 
 

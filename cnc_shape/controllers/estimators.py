@@ -21,7 +21,7 @@ SMALLEST_ARM = 1e-9  # mm, from the centre of curvature: nearer to it every dire
 
 @kernel
 def tangent_error(tracking, frame, error):
-    """Contour error by the tangent: tracking (>=3,) mm; frame (2,3): unit tangent, curvature; error (3,) mm."""
+    """Contour error by the tangent: tracking (>=3,) mm; frame (2,3): tangent, curvature; error (3,)."""
     along = 0.0
     for i in range(error.size):
         along += tracking[i] * frame[0, i]
@@ -51,7 +51,9 @@ def circle_error(tracking, frame, error):
 
 
 @kernel
-def foot_error(position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment, error):
+def foot_error(
+    position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment, error
+):
     """Contour error to the path itself, for tick k.
 
     position (n,d) mm, of the command; tracking (d,) mm; path, lower, upper, cursor, distance, place,

@@ -62,8 +62,8 @@ def servo_loop(
 
     command: a `Command`; poses: `Poses`; path, lower (n,), upper (n,) mm: the path and every tick's window on
     it, where foot points are asked for; plant: a `Plant` of the joints; feed, couple: 1 where that term
-    acts; memory: a `Memory`. Returns joint, tool and velocity command, (n,j) each, and the ticks run: fewer
-    than n where the loop diverged.
+    acts; memory: a `Memory`. Returns joint, its rate, tool and velocity command, (n,j) each, and the ticks
+    run: fewer than n where the loop diverged.
     """
     position, velocity, acceleration, reference, reference_velocity = command
     inverse, phase, every = poses
@@ -73,23 +73,25 @@ def servo_loop(
     linear = min(3, position.shape[1])
     cartesian = inverse.shape[0] == 0
     solved = inverse.shape[1]
-    joint, tool, drive = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
+    joint, rate = np.empty((n, joints)), np.empty((n, joints))
+    tool, drive = np.empty((n, joints)), np.empty((n, joints))
     following, mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints), np.empty(joints)
     told = np.empty(joints)
-    tracking, work = np.empty(max(joints, 3)), np.empty((solved, solved))
+    tracking, work = np.zeros(max(joints, 3)), np.empty((solved, solved))
+    coupled = following[:solved]
     error, speed = np.zeros(3), np.zeros(3)
     searched = n if couple and couple_gains.estimator == FOOT_POINT else 0
     tools, feet = np.empty((searched, 3)), np.empty((searched, 3))
     distance, place, segment = np.empty(searched), np.empty(searched), np.empty(searched, np.int64)
     for k in range(n):
         for j in range(joints):
-            joint[k, j] = state[j, 0]
+            joint[k, j], rate[k, j] = state[j, 0], state[j, 1]
             tool[k, j] = state[j, 0]
             for i in range(2, states[j], 2):
                 tool[k, j] += state[j, i]
             following[j] = reference[k, j] - state[j, 0]
             if not abs(following[j]) <= FURTHEST:
-                return joint, tool, drive, k
+                return joint, rate, tool, drive, k
             told[j] = 0.0
             mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
             mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
@@ -114,7 +116,7 @@ def servo_loop(
                 for i in range(joints, 3):
                     tracking[i] = 0.0
             else:
-                solve(inverse[row], following, tracking, work)
+                solve(inverse[row], coupled, tracking, work)
             if couple_gains.estimator == FOOT_POINT:
                 estimators.foot_error(
                     position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment,
@@ -166,4 +168,4 @@ def servo_loop(
             if ideal[j]:
                 state[j, 0] = reference[k + 1, j]
                 state[j, 1] = reference_velocity[k + 1, j]
-    return joint, tool, drive, n
+    return joint, rate, tool, drive, n
