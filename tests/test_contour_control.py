@@ -70,6 +70,8 @@ def test_more_controllers_on_the_fan(gain, name):
     for rig, theirs in zip((CARTESIAN, CUBIC, MEAN), FAN[gain, name], strict=True):
         if rig is MEAN and name == "feedforward, own models":
             continue  # the prototype's models were those of the unlike drives there
+        if rig is not CUBIC and gain > 20.0:
+            continue  # nothing new, and it takes time
         plants = PLANTS if rig is CUBIC else PLANTS[:3]
         ours = errors(rig, "fan", variants(plants, gain)[name])
         if "of the length" in name:
@@ -87,8 +89,7 @@ def test_gain_sweep(estimator, gain, delay, feedforward):
     base = Control(position_gain=gain, delay_samples=delay)
     base = fed(COMMON, base) if feedforward else base
     coupled = tangent if estimator == "tangent" else foot
-    chosen = [0, 3, 6, 8, 10, 13, 16, 17, 18, 20]
-    for k in chosen:
+    for k in (0, 3, 8, 10, 16, 17, 19):
         theirs = SWEEPS[estimator, gain, delay, feedforward][k]
         ours, _ = errors(CUBIC, "fan", coupled(float(SWEPT[k]), base))
         if theirs is None:
@@ -113,7 +114,10 @@ def test_jacobians_kept_for_a_while(place, every, name):
 
 def test_a_frozen_jacobian_is_ten_times_worse():
     always = foot(80.0)
-    assert errors(CUBIC, "fan", replace(always, jacobian_every=10**6))[0] > 10.0 * errors(CUBIC, "fan", always)[0]
+    assert (
+        errors(CUBIC, "fan", replace(always, jacobian_every=10**6))[0]
+        > 10.0 * errors(CUBIC, "fan", always)[0]
+    )
 
 
 # --- time laws
@@ -134,7 +138,8 @@ def test_the_fan_interpolated_every_millisecond(name, theirs):
 
 
 @pytest.mark.parametrize(
-    ("feed", "alone", "best"), [(8.0, 4.89, 0.28), (16.0, 18.18, 0.71), (32.0, 63.8, 2.31), (64.0, 197.0, 7.71)]
+    ("feed", "alone", "best"),
+    [(8.0, 4.89, 0.28), (16.0, 18.18, 0.71), (32.0, 63.8, 2.31), (64.0, 197.0, 7.71)],
 )
 def test_feeds(feed, alone, best):
     law = TimeLaw(feed_rate=feed)

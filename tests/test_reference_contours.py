@@ -18,6 +18,7 @@ LENGTHS = {  # mm: length, smallest radius
     "corner": (60.0, np.inf),
     "lemniscate": (157.323, 10.0),
     "helix": (4.0 * np.pi * np.hypot(20.0, 10.0 / (2.0 * np.pi)), 20.1267),
+    "line": (50.0, np.inf),
 }
 CURVES = TimeLaw(interpolation_period=8e-3)
 DURATIONS = {  # s, with the rest of 0.5 s at the end

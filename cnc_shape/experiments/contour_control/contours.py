@@ -37,6 +37,7 @@ FAN: Final = (
 )  # fmt: skip
 DIAMOND: Final = ((15.0, 15.0), (0.0, 30.0), (-30.0, 0.0), (0.0, -30.0), (30.0, 0.0), (15.0, 15.0))
 CORNER: Final = ((0.0, 0.0), (30.0, 0.0), (30.0, 30.0))
+LINE: Final = ((0.0, 0.0), (40.0, 30.0))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -267,5 +268,6 @@ def contours() -> Mapping[str, Contour]:
         polygon("corner", CORNER),
         lemniscate(30.0),
         circle("helix", 20.0, laps=2, pitch=10.0),
+        polygon("line", LINE),
     )
     return {contour.name: contour for contour in every}

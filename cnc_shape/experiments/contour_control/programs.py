@@ -57,7 +57,7 @@ def sample_files() -> Mapping[str, Callable[[], str]]:
     """Files that are bundled as samples: how their text is made."""
     every = contours()
     files: dict[str, Callable[[], str]] = {
-        f"{name}.nc": lambda contour=contour: program_text(contour) for name, contour in every.items()
+        f"{name}.nc": lambda contour=every[name]: program_text(contour) for name in TITLES
     }
     files["circle5_time.csv"] = lambda: time_table(every["circle5"], TimeLaw())
     return files

@@ -37,6 +37,7 @@ MEAN_PLANT: Final = FirstOrderLag(
     sum(plant.gain for plant in PLANTS) / len(PLANTS),
 )
 HALF_WIDTH, LINK_LENGTH, TOOL_OFFSET = 60.0, 300.0, (0.0, 0.0, -60.0)  # mm
+RAILS: Final = cubic_rails(HALF_WIDTH, LINK_LENGTH, frozen(TOOL_OFFSET))
 NO_LIMIT: Final = Limits(velocity=np.inf, acceleration=np.inf)
 BACK, AHEAD, MARGIN = 4.0, 1.5, 0.5  # of 1/Kp, of 1/Kp, mm: how far from the command the contour is searched
 
@@ -92,7 +93,7 @@ MEAN: Final = Rig(
 CUBIC: Final = Rig(
     "cubic",
     Machine("cubic", tuple(Axis(name, NO_LIMIT) for name in XYZ), PLANTS),
-    cubic_parallel(cubic_rails(HALF_WIDTH, LINK_LENGTH, frozen(TOOL_OFFSET))),
+    cubic_parallel(RAILS),
 )
 
 
@@ -117,6 +118,7 @@ TRIALS: Final[Mapping[str, tuple[str, TimeLaw]]] = {
     "corner, through": ("corner", FINE),
     "lemniscate": ("lemniscate", FINE),
     "helix": ("helix", FINE),
+    "line": ("line", TimeLaw(dwell=20.0)),
 }
 
 
