@@ -22,6 +22,7 @@ from cnc_shape.plant import discretise
 
 EXACT: Final = 1e-9  # what a closed form and a computed number that agree may differ by
 SHOWN: Final = 0.005  # of numbers that the paper does not print
+PRINTED: Final = 5e-4  # what is shown of a number that cannot be rounding
 POSES: Final = 50
 REACH, TILT = 60.0, 0.25  # mm, rad: of the poses tried
 SAMPLE_TIME: Final = 1e-3  # s
@@ -47,7 +48,7 @@ def jacobian_table() -> Table:
             Row("eq 4, first line: A - B D⁻¹ C against the exact Jacobian", "-", 0.0, max(minus), EXACT,
                 "relative to the largest element; exact: the inverse of the Jacobian by reciprocal "
                 f"screws; {at}"),
-            Row("eq 4, second line: A + B D⁻¹ C against the exact Jacobian", "-", 0.0, min(plus), EXACT,
+            Row("eq 4, second line: A + B D⁻¹ C against the exact Jacobian", "-", 0.0, min(plus), PRINTED,
                 "largest error relative to the largest element, at the best of the poses: the sign is "
                 "wrong, b = -D⁻¹ C a follows from C a + D b = 0"),
             Row("eq 4 with screws about the program's origin", "-", None, max(origin), SHOWN,
@@ -107,7 +108,8 @@ def estimate_table() -> Table:
             Row("eq 7, <n, t>", "-", 0.0, float(np.abs((n * t).sum(axis=1)).max()), EXACT,
                 f"n by eqs 6 and 12; {at}"),
             Row("eq 8, ‖n‖ - 1", "-", 0.0, float(np.abs(np.linalg.norm(n, axis=1) - 1.0).max()), EXACT, at),
-            Row("eq 11, pairs with <n, e> below 0", "-", 0.0, float(((n * e).sum(axis=1) < 0.0).sum()), 0.0, at),
+            Row("eq 11, pairs with <n, e> below 0", "-", 0.0,
+                float(((n * e).sum(axis=1) < 0.0).sum()), 0.0, at),
             Row("eq 13 against e - <e, t> t", "-", 0.0,
                 float(np.abs(estimate - (e - along[:, None] * t)).max()), EXACT,
                 f"what the loop computes: the same, but not 0/0 where e lies along t; {at}"),

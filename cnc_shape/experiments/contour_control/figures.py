@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cnc_shape.arrays import frozen
+from cnc_shape.arrays import FloatArray
 from cnc_shape.experiments.contour_control.comparisons import BEST
 from cnc_shape.experiments.contour_control.contours import FAN, FEED_RATE, contours
 from cnc_shape.experiments.contour_control.laws import (
@@ -42,9 +42,10 @@ SHOWN: Final = {
     "tangent, Kc 10": PAPER,
     "foot point, Kc 10, feedforward": SAME_LOOP,
 }
-MAGNIFIED: Final = 60.0
+MAGNIFIED: Final = 25.0
 TRAVEL: Final = 70.0  # mm of rail drawn to both sides of home
-PLACE: Final = 60.5  # mm on the fan, the middle of the detail
+DETAIL: Final = 0.3  # mm to both sides
+TOGETHER: Final = 16  # samples
 GAINS: Final = (5.0, 6.5, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 160.0, 240.0, 320.0)
 
 
@@ -82,10 +83,11 @@ def machine() -> Figure:
     axes.plot(*np.array([centre, np.zeros(3)]).T, color="black", linewidth=2.5)
     fan = contours()["fan"]
     path = fan.at(np.linspace(0.0, fan.length, 600)).position
-    axes.plot(*path.T, color=COLOURS[0], linewidth=1.0)
+    axes.plot(*path.T, color=COLOURS[3], linewidth=1.2)
     axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     axes.set_aspect("equal")
     axes.view_init(24.0, 40.0)
+    axes.set_box_aspect(None, zoom=1.15)
     axes.set_title(
         f"Fig. 3: six sliders, links of 300 mm, platform of ±{HALF_WIDTH:g} mm, the tool on the fan"
     )
@@ -110,9 +112,9 @@ def fan_and_feed() -> Figure:
     allowed = 2.0 * np.sqrt(2.0 * radius * MICROMETRE) / SMOOTH.interpolation_period
     feed.plot(law.arc_length, np.minimum(allowed, 60.0), **look(1, 0.9), label="allowed by 1 µm, every 8 ms")
     feed.plot(law.arc_length, law.speed, **look(0, 1.3), label="run")
-    feed.set(xlim=(0.0, fan.length), ylim=(0.0, 36.0), xlabel="arc length (mm)", ylabel="feed (mm/s)")
+    feed.set(xlim=(0.0, fan.length), ylim=(0.0, 30.0), xlabel="arc length (mm)", ylabel="feed (mm/s)")
     feed.set_title(f"Feed: {FEED_RATE:g} mm/s, less where it curves")
-    feed.legend(loc="upper right")
+    feed.legend(loc="lower center")
     return figure
 
 
@@ -123,15 +125,16 @@ def magnified_response() -> Figure:
     fan = contours()["fan"]
     path = fan.at(np.linspace(0.0, fan.length, 6000)).position
     for axes in (whole, detail):
-        axes.plot(path[:, 0], path[:, 1], color=PATH_COLOUR, linewidth=1.0, label="contour")
+        axes.plot(path[:, 0], path[:, 1], color=PATH_COLOUR, linewidth=3.5, alpha=0.5, label="contour")
         axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
-    middle = fan.at(frozen([PLACE])).position[0]
+    law = speed_along(fan, SMOOTH)
+    middle = fan.at(law.arc_length[[np.argmin(law.limit)]]).position[0]
     for k, (name, result) in enumerate(responses().items()):
         foot_point, tool = result.error.foot, result.response.position
         shown = foot_point + MAGNIFIED * (tool - foot_point)
         whole.plot(shown[:, 0], shown[:, 1], **look(k), label=name)
         detail.plot(tool[:, 0], tool[:, 1], **look(k), label=name)
-    detail.set(xlim=(middle[0] - 0.5, middle[0] + 0.5), ylim=(middle[1] - 0.5, middle[1] + 0.5))
+    detail.set(xlim=(middle[0] - DETAIL, middle[0] + DETAIL), ylim=(middle[1] - DETAIL, middle[1] + DETAIL))
     whole.set_title(f"Fig. 5: errors {MAGNIFIED:g} times")
     detail.set_title("where it curves most, as it is")
     handles, labels = whole.get_legend_handles_labels()
@@ -146,8 +149,8 @@ def contour_errors() -> Figure:
     shown = {**SHOWN, "foot point, Kc 80, one model for all": COMPARED[BEST]}
     for k, (name, control) in enumerate(shown.items()):
         result = responses().get(name) or run(CUBIC, "fan", control)
-        distance = result.error.distance / MICROMETRE
-        time = SMOOTH.sample_time * np.arange(distance.size)
+        distance = _highest(result.error.distance / MICROMETRE)
+        time = SMOOTH.sample_time * TOGETHER * np.arange(distance.size)
         for axes in panels:
             axes.plot(time, distance, **look(k, 1.0), label=f"{name}: {result.rms:.2f} µm RMS")
     panels[0].set(ylim=(0.0, 80.0), ylabel="contour error (µm)")
@@ -157,6 +160,11 @@ def contour_errors() -> Figure:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
+
+
+def _highest(values: FloatArray) -> FloatArray:
+    """Largest of every few samples: the curve seen from above."""
+    return np.maximum.reduceat(values, np.arange(0, values.size, TOGETHER))
 
 
 @styled
