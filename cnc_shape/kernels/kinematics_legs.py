@@ -22,7 +22,7 @@ from cnc_shape.kernels.linear import solve
 
 @kernel
 def turn_to(pose, rotation):
-    """Rotation matrix Rz(c) Ry(b) Rx(a) of pose (6,): into `rotation` (3,3)."""
+    """Rotation matrix Rz(c) Ry(b) Rx(a) of pose (6,), and the axis that b turns about: into `rotation` (3,4)."""
     sa, ca = math.sin(pose[3]), math.cos(pose[3])
     sb, cb = math.sin(pose[4]), math.cos(pose[4])
     sc, cc = math.sin(pose[5]), math.cos(pose[5])
@@ -35,7 +35,15 @@ def turn_to(pose, rotation):
     rotation[0, 2] = cc * sb * ca + sc * sa
     rotation[1, 2] = sc * sb * ca - cc * sa
     rotation[2, 2] = cb * ca
-    return cc, sc
+    rotation[0, 3] = -sc
+    rotation[1, 3] = cc
+    rotation[2, 3] = 0.0
+
+
+@kernel
+def turned(before, pose):
+    """Whether a pose (6,) has other angles than the pose before: most programs keep theirs for long."""
+    return before[3] != pose[3] or before[4] != pose[4] or before[5] != pose[5]
 
 
 @kernel
@@ -65,9 +73,10 @@ def leg_of(i, pose, rotation, direction, origin, point, length):
 @kernel
 def joints_of(axes, direction, origin, point, length, joints):
     """Joints of poses axes (n,6): into joints (n,6)."""
-    rotation = np.empty((3, 3))
+    rotation = np.empty((3, 4))
     for row in range(axes.shape[0]):
-        turn_to(axes[row], rotation)
+        if row == 0 or turned(axes[row - 1], axes[row]):
+            turn_to(axes[row], rotation)
         for i in range(6):
             leg = leg_of(i, axes[row], rotation, direction, origin, point, length)
             joints[row, i] = leg[0]
@@ -77,9 +86,9 @@ def joints_of(axes, direction, origin, point, length, joints):
 def rates_at(pose, rotation, direction, origin, point, length, joint, rates):
     """Joints of one pose and their rates per rate of its axes: into joint (6,) and rates (6,6).
 
-    The angular velocity of angle rates is omega = a' R ex + b' (-sin c, cos c, 0) + c' ez.
+    rotation (3,4) as `turn_to` leaves it. The angular velocity of angle rates is
+    omega = a' R ex + b' (-sin c, cos c, 0) + c' ez.
     """
-    cc, sc = turn_to(pose, rotation)
     for i in range(6):
         joint[i], ax, ay, az, sx, sy, sz, reach = leg_of(
             i, pose, rotation, direction, origin, point, length
@@ -92,15 +101,17 @@ def rates_at(pose, rotation, direction, origin, point, length, joint, rates):
         rates[i, 1] = sy * scale
         rates[i, 2] = sz * scale
         rates[i, 3] = mx * rotation[0, 0] + my * rotation[1, 0] + mz * rotation[2, 0]
-        rates[i, 4] = my * cc - mx * sc
+        rates[i, 4] = mx * rotation[0, 3] + my * rotation[1, 3]
         rates[i, 5] = mz
 
 
 @kernel
 def jacobians_of(axes, direction, origin, point, length, rates):
     """Joint rates per axis rates at poses axes (n,6): into rates (n,6,6)."""
-    rotation, joint = np.empty((3, 3)), np.empty(6)
+    rotation, joint = np.empty((3, 4)), np.empty(6)
     for row in range(axes.shape[0]):
+        if row == 0 or turned(axes[row - 1], axes[row]):
+            turn_to(axes[row], rotation)
         rates_at(axes[row], rotation, direction, origin, point, length, joint, rates[row])
 
 
@@ -111,7 +122,7 @@ def poses_of(joints, near, direction, origin, point, length, tolerance, rounds, 
     A step that does not bring the joints nearer is halved. Ends where the largest difference of a joint is
     below `tolerance` (mm); a row that is not there after `rounds` steps is nan.
     """
-    rotation, work = np.empty((3, 3)), np.empty((6, 6))
+    rotation, work = np.empty((3, 4)), np.empty((6, 6))
     rates = np.empty((6, 6))
     joint, lacking, step, pose = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     for row in range(joints.shape[0]):
@@ -120,6 +131,7 @@ def poses_of(joints, near, direction, origin, point, length, tolerance, rounds, 
         last = np.inf
         found = False
         for _ in range(rounds):
+            turn_to(pose, rotation)
             rates_at(pose, rotation, direction, origin, point, length, joint, rates)
             worst = 0.0
             for i in range(6):
@@ -145,7 +157,7 @@ def poses_of(joints, near, direction, origin, point, length, tolerance, rounds, 
 @kernel
 def turns_of(first, second, angle):
     """Angle of the rotation between the orientations of two poses (n,6) each: into angle (n,), rad."""
-    before, after, between = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    before, after, between = np.empty((3, 4)), np.empty((3, 4)), np.empty((3, 3))
     for row in range(first.shape[0]):
         turn_to(first[row], before)
         turn_to(second[row], after)
