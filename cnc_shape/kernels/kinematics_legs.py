@@ -90,9 +90,7 @@ def rates_at(pose, rotation, direction, origin, point, length, joint, rates):
     omega = a' R ex + b' (-sin c, cos c, 0) + c' ez.
     """
     for i in range(6):
-        joint[i], ax, ay, az, sx, sy, sz, reach = leg_of(
-            i, pose, rotation, direction, origin, point, length
-        )
+        joint[i], ax, ay, az, sx, sy, sz, reach = leg_of(i, pose, rotation, direction, origin, point, length)
         scale = 1.0 / reach
         mx = (ay * sz - az * sy) * scale
         my = (az * sx - ax * sz) * scale

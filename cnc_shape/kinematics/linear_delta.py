@@ -68,6 +68,4 @@ def linear_delta(
         carriage_rates(rows(axes, 3), tower, length, rates)
         return rates
 
-    return Kinematics(
-        "linear_delta", ("x", "y", "z"), ("q1", "q2", "q3"), forward, inverse, inverse_jacobian
-    )
+    return Kinematics("linear_delta", ("x", "y", "z"), ("q1", "q2", "q3"), forward, inverse, inverse_jacobian)

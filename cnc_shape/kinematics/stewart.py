@@ -28,7 +28,5 @@ def stewart(base: FloatArray, platform: FloatArray, tool_offset: FloatArray) -> 
     """
     ends = triple_rows("platform", platform)
     nothing = frozen(np.zeros((6, 3)))
-    legs = Legs(
-        nothing, triple_rows("base", base), offset_points(ends, tool_offset), frozen(np.zeros(6))
-    )
+    legs = Legs(nothing, triple_rows("base", base), offset_points(ends, tool_offset), frozen(np.zeros(6)))
     return on_legs("stewart", legs, float(np.linalg.norm(ends, axis=1).mean()))
