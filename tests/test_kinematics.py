@@ -1,6 +1,7 @@
 """Kinematics: there and back, rates against differences, and the two Jacobians of paper 004."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import naive
 import numpy as np
@@ -116,7 +117,7 @@ def test_rows_do_not_know_one_another(machine):
     joints, near = machine.inverse(axes), axes + poses(machine, 40, seed=2) / 60
     for cuts in ([7], [1, 2, 11, 12, 30], range(41)):
         edges = [0, *cuts, 40]
-        parts = [slice(*edge) for edge in zip(edges, edges[1:], strict=False)]
+        parts = [slice(*edge) for edge in pairwise(edges)]
         for whole, pieces in (
             (joints, [machine.inverse(axes[part]) for part in parts]),
             (machine.forward(joints, near), [machine.forward(joints[part], near[part]) for part in parts]),
@@ -343,7 +344,9 @@ def test_turn_of_a_table_is_the_angle_between_tool_directions():
     level[:, 4] = 0.4
     tilted[:, 3:] = [[0.3, 2.0], [1e-8, 0.0]]
     assert_allclose(turn(level, tilted), [0.3, 1e-8], rtol=1e-12)
-    assert_array_equal(turn(level, level + [1, 2, 3, 0, 0.5]), [0.0, 0.0])  # upright: turning is no tilt
+    assert_array_equal(
+        turn(level, level + np.array([1, 2, 3, 0, 0.5])), [0.0, 0.0]
+    )  # upright: turning is no tilt
 
 
 # --- reach ------------------------------------------------------------------------------------------
