@@ -19,11 +19,15 @@ from cnc_shape.joints import joints_of
 from cnc_shape.machine import FirstOrderLag
 from cnc_shape.units import DEGREE
 
+SINGULAR = 1e12  # -, condition of the Jacobian beyond which home is no pose to judge a loop at
+
 
 def check_loop(setup: Setup) -> dict[str, float | None]:
     """Refuse an unstable loop; return its margins at home, ready for JSON.
 
-    Home is where all axes stand at 0. Null where there is no end: no drive that lags, or no such pose.
+    Home is where all axes stand at 0. Null where there is no end, as without any drive that
+    lags, or where the machine cannot stand there. The largest cross-coupling is that of the file's ratios of
+    integral and derivative to proportional gain, or of a proportional one.
 
     Raises
     ------
@@ -39,6 +43,7 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
         axes = joints.drives
         home = joints.inverse_jacobian(np.zeros((1, len(axes))))
         home = home[np.isfinite(home).all(axis=(1, 2))]
+        home = home[np.linalg.cond(home) < SINGULAR]
         check_poses([axis.drive for axis in axes], control, home)
     drives = [axis.drive for axis in axes]
     if not len(home) or not any(isinstance(drive, FirstOrderLag) for drive in drives):
