@@ -692,3 +692,33 @@ def tilted(vector, a, c, pivot):
     about_x = expm(a * np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0]]))
     about_z = expm(c * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]]))
     return about_x @ about_z @ (vector - pivot) + pivot
+
+
+# --- stability ------------------------------------------------------------------------------------
+
+
+def coupled_tick(drives, control, inverse_jacobian, tangent, state):
+    """One tick of the loop around a standing command, contour control section 3, written term by term.
+
+    state: (q, v, integral, error before, commands on their way); all drives lag.
+    """
+    q, v, integral, before, late = state
+    coupling, period = control.cross_coupling, control.sample_time
+    across = np.eye(3) - np.outer(tangent, tangent)
+    phi = -q
+    e = np.linalg.solve(inverse_jacobian, phi)
+    eps = across @ e[:3]
+    w = coupling.proportional * eps + coupling.integral * integral
+    w = w + coupling.derivative * (eps - before) / period
+    told = control.position_gain * phi
+    told = told + inverse_jacobian @ np.concatenate([w, coupling.orientation * e[3:]])
+    integral = across @ (integral + period * eps)
+    late = [*late, told]
+    heard, late = late[0], late[1:]
+    moved, sped = np.empty_like(q), np.empty_like(v)
+    for i, drive in enumerate(drives):
+        al = np.exp(-period / drive.time_constant)
+        be = drive.time_constant * (1.0 - al)
+        moved[i] = q[i] + be * v[i] + drive.gain * (period - be) * heard[i]
+        sped[i] = al * v[i] + (1.0 - al) * drive.gain * heard[i]
+    return moved, sped, integral, eps, late
