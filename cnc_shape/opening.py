@@ -25,6 +25,7 @@ from cnc_shape.refusals import refuse_pose
 from cnc_shape.smoothing import Smoothing, smoothing
 from cnc_shape.timing import PLAIN, Timing
 from cnc_shape.toolpath import building
+from cnc_shape.trajectory import Trajectory, join_trajectories
 from cnc_shape.windows import Reach, WindowState, windowing
 
 NOWHERE_ELSE = Reach(0, 0, 0.0)  # a command is where it is
@@ -166,6 +167,7 @@ def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterato
         return
     look = windowing(NOWHERE_ELSE)
     places: WindowState | None = None
+    before: Trajectory | None = None
     first: Timing | None = None
     begun = False
     for block in blocks:
@@ -174,8 +176,10 @@ def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterato
             command = block.command
             places, windows = look(places, block.toolpath, command.arc_length, block.last)
             if len(command):
+                command = command if before is None else join_trajectories([before, command])
                 joints = joints_of(setup.machine.with_axes(command.axes), setup.kinematics)
                 refuse_pose(joints, joints.pose(command.position), command.arc_length, windows, source)
+                before = command.cut(slice(-1, None))
         yield block
 
 
