@@ -215,6 +215,13 @@ def test_large_machines_are_found_too(size):
     assert_allclose(machine.forward(machine.inverse(axes), 0 * axes), axes, rtol=0, atol=1e-10 * size)
 
 
+@pytest.mark.parametrize("name", ["cubic_parallel", "cubic_parallel of a user"])
+def test_steps_that_lead_too_far_are_halved(name):
+    machine = MACHINES[name]
+    axes = 2 * poses(machine, 2000, seed=0)  # from home, full steps lose three of the user's
+    assert_allclose(machine.forward(machine.inverse(axes), 0 * axes), axes, rtol=0, atol=1e-9)
+
+
 def test_a_pose_that_no_joints_hold_is_nan():
     machine = MACHINES["stewart"]
     joints = np.stack([np.full(6, 1.0), machine.inverse(np.zeros((1, 6)))[0]])
