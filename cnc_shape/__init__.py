@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cnc_shape import shapers as design
     from cnc_shape.api import plot, simulate_program, write_report
     from cnc_shape.config.machine_file import load_machine
-    from cnc_shape.contour import contour_error, foot_windows
+    from cnc_shape.contour import contour_error
     from cnc_shape.controllers import Control, CrossCoupling, Feedforward
     from cnc_shape.feedrate import plan
     from cnc_shape.modes import Mode
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from cnc_shape.smoothing import Smoothing, smooth
     from cnc_shape.toolpath import build_toolpath
     from cnc_shape.trajectory import sample
+    from cnc_shape.windows import foot_windows
 
 _HOMES = {
     "Control": "controllers",
@@ -45,7 +46,7 @@ _HOMES = {
     "Smoothing": "smoothing",
     "build_toolpath": "toolpath",
     "contour_error": "contour",
-    "foot_windows": "contour",
+    "foot_windows": "windows",
     "load_machine": "config.machine_file",
     "plan": "feedrate",
     "plot": "api",

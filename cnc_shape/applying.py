@@ -17,9 +17,10 @@ from cnc_shape.kernels.sums import largest_ratio
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
-from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, window
+from cnc_shape.pipeline import Deviation, deviation
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.trajectory import Trajectory
+from cnc_shape.windows import foot_reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,7 @@ class Application:
                 self._speed = self._push = np.zeros(len(self._axes))
                 shape = command_shaping(self._shaping, self._axes, self._sample_time)
                 longer = self._shaping.longer(self._axes, self._sample_time)
-                measure = measuring(*window(0.0, longer, self._sample_time), WINDOW_MARGIN)
+                measure = measuring(foot_reach(0.0, longer, self._sample_time))
             largest_ratio(block.command.velocity, velocity, self._plain)
             largest_ratio(block.command.acceleration, acceleration, self._plain)
             shaped, command = shape(shaped, block.command, block.last)

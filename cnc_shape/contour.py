@@ -1,12 +1,7 @@
 """Contour error: the distance from a position to the programmed path.
 
 Measured against the exact lines and arcs, never against sampled vertices, and only within a window of
-the path. The window is one of time: at sample k it reaches from the place that the command had `back`
-samples ago to the one it has `ahead` samples on. A position loop of gain Kp follows what it was told
-over the last few 1/Kp, a shaper mixes what was commanded within its duration, so nothing else of the
-path can be meant. A window of fixed length would do at constant feed only: at a corner, where a machine
-creeps, it would reach around to the next side, and on a raster across to the neighbouring line, and find
-a small distance to a place that the tool is not due at. In time it shrinks where the machine slows down.
+the path (`windows`).
 """
 
 from __future__ import annotations
@@ -18,13 +13,12 @@ from math import sqrt
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels.foot_point import feet, pack, points_at, stack_boxes
+from cnc_shape.kernels.foot_point import feet, points_at
 from cnc_shape.kernels.sums import add_squares
-from cnc_shape.segments import NO_SEGMENTS, Segments, join, segments, since
+from cnc_shape.segments import Segments, path_table, segments
 from cnc_shape.toolpath import Toolpath
 from cnc_shape.units import MICROMETRE
-
-BACKTRACK = 0.1  # mm of path kept for commands that run backwards by rounding, or between samples
+from cnc_shape.windows import Reach, WindowState, windowing
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -86,26 +80,6 @@ def tally(state: Tally, error: ContourError) -> Tally:
     )
 
 
-def foot_windows(
-    arc_length: FloatArray, back: int, ahead: int, margin: float
-) -> tuple[FloatArray, FloatArray]:
-    """Window of every sample of a whole motion: lower and upper end, (n,) mm of path each.
-
-    Parameters
-    ----------
-    arc_length
-        (n,) mm, place of each sample's command on the toolpath; it never runs back by more than `BACKTRACK`.
-    back, ahead
-        Samples.
-    margin
-        mm, added on both sides.
-    """
-    rows = np.arange(arc_length.size)
-    lower = arc_length[np.maximum(rows - back, 0)] - margin
-    upper = arc_length[np.minimum(rows + ahead, arc_length.size - 1)] + margin
-    return lower, upper
-
-
 def contour_error(
     position: FloatArray,
     toolpath: Toolpath,
@@ -143,18 +117,12 @@ def _measure(
     """Contour error of every signal, (n, >= 3) mm each, in the same windows."""
     if path.low.size == 0:
         raise ValueError("a contour error needs a path")
-    table = frozen(pack(path.start, path.end, path.low, path.high, path.arc))
-    tree, first = stack_boxes(path.boxes)
+    table = path_table(path)
     errors: list[ContourError] = []
     for signal in signals:
         points = frozen(signal[:, :3])
-        distance, place, segment = feet(
-            points, lower, upper, table, path.low, path.high, path.arcs, path.boxes, tree, first
-        )
-        foot = points_at(
-            frozen(place), frozen_integers(segment),
-            path.start, path.end, path.low, path.high, path.arc, path.arcs,
-        )  # fmt: skip
+        distance, place, segment = feet(points, lower, upper, table)
+        foot = points_at(frozen(place), frozen_integers(segment), table)
         errors.append(
             ContourError(frozen(distance), frozen(foot), frozen(place), frozen_integers(path.line[segment]))
         )
@@ -163,15 +131,14 @@ def _measure(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MeasuringState:
-    """What later samples still need: path within reach, samples that wait for what lies ahead."""
+    """The windows under way, and the samples that wait for theirs."""
 
-    path: Segments
-    arc_length: FloatArray  # (back + w,) mm, of the samples before and of those waiting
+    windows: WindowState
     waiting: tuple[FloatArray, ...]  # (w,3) mm, one array a signal
 
 
 def measuring(
-    back: int, ahead: int, margin: float
+    reach: Reach,
 ) -> Callable[
     [MeasuringState | None, Toolpath | None, FloatArray, Sequence[FloatArray], bool],
     tuple[MeasuringState, tuple[ContourError, ...]],
@@ -179,10 +146,10 @@ def measuring(
     """Return the resumable stage that measures several signals against the same windows.
 
     Its step takes the toolpath that has come in (or None), the samples' places on it, one position array
-    a signal, and whether that was all. The toolpath must come before the samples that run on it. A sample
-    is decided when its window is: `ahead` samples later, and when the path has arrived that far; so each
-    step returns the errors of the samples decided by now, in order, and the last step all that are left.
+    a signal, and whether that was all; it returns the errors of the samples whose windows are decided by
+    now, in order, and the last step all that are left.
     """
+    decide = windowing(reach)
 
     def step(
         state: MeasuringState | None,
@@ -191,39 +158,16 @@ def measuring(
         signals: Sequence[FloatArray],
         last: bool,
     ) -> tuple[MeasuringState, tuple[ContourError, ...]]:
-        path = NO_SEGMENTS if state is None else state.path
-        if toolpath is not None and len(toolpath):
-            path = join(path, segments(toolpath, first=path.low.size == 0))
-        if state is None:
-            before = np.full(back if arc_length.size else 0, arc_length[0] if arc_length.size else 0.0)
-            waiting = [signal[:, :3] for signal in signals]
-        else:
-            before = state.arc_length
-            if before.size == 0 and arc_length.size:
-                before = np.full(back, arc_length[0])
-            waiting = [
-                np.concatenate([old, new[:, :3]]) for old, new in zip(state.waiting, signals, strict=True)
-            ]
-        places = np.concatenate([before, arc_length])
-        samples = waiting[0].shape[0]
-        if last and samples:
-            places = np.concatenate([places, np.full(ahead, places[-1])])
-        upper = places[back + ahead :] + margin
-        decided = upper.size
-        if not last and decided:
-            # a move still to come may begin at the very end of those that are here: beyond, not at it
-            arrived = path.high[-1] if path.low.size else -np.inf
-            reached = upper < arrived
-            decided = decided if reached.all() else int(reached.argmin())
-        windows = frozen(places[:decided] - margin), frozen(upper[:decided])
+        now, windows = decide(state and state.windows, toolpath, arc_length, last)
+        waiting = [signal[:, :3] for signal in signals]
+        if state is not None:
+            waiting = [np.concatenate(pair) for pair in zip(state.waiting, waiting, strict=True)]
+        decided = windows.lower.size
         errors = tuple(_NOTHING for _ in waiting)
         if decided:
-            errors = _measure([signal[:decided] for signal in waiting], path, *windows)
-        if samples:  # no later window begins before that of the next sample
-            following = float(places[min(decided, samples + back - 1)])
-            path = since(path, following - margin - BACKTRACK)
-        places = places[decided : samples + back]
-        return MeasuringState(path, places, tuple(signal[decided:] for signal in waiting)), errors
+            signals = [signal[:decided] for signal in waiting]
+            errors = _measure(signals, windows.path, windows.lower, windows.upper)
+        return MeasuringState(now, tuple(signal[decided:] for signal in waiting)), errors
 
     return step
 

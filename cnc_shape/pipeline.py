@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, sqrt
+from math import sqrt
 from typing import Protocol
 
 import numpy as np
@@ -27,18 +27,17 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
+from cnc_shape.joints import CARTESIAN, joints_of
 from cnc_shape.kernels.sums import add_squares
-from cnc_shape.machine import FirstOrderLag, Machine
+from cnc_shape.kinematics import Kinematics
+from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
 from cnc_shape.recording import Outline, Recorder, Signals
+from cnc_shape.servo import settling_time
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.simulation import SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
-
-WINDOW_MARGIN = 0.5  # mm, of the contour error's window on both sides
-WINDOW_BACK = 4.0  # of the position loop's time constant 1/Kp
-WINDOW_AHEAD = 1.5  # of the position loop's time constant 1/Kp
-SLOWEST_LOOP = 2.5  # s, time constant beyond which the window grows no more
+from cnc_shape.windows import foot_reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,19 +64,12 @@ def deviation(found: Tally) -> Deviation:
     return Deviation(found.rms, found.max, found.line)
 
 
-def window(settling: float, longest: float, sample_time: float) -> tuple[int, int]:
-    """Samples back and ahead of its own within which a sample's place on the path is sought.
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Angle between the tool's direction against the workpiece and the commanded one, over all samples."""
 
-    settling: time constant of the position loop, s, 0 for ideal drives; longest: of the shapers' delays, s.
-    """
-    back, ahead = WINDOW_BACK * settling + longest, WINDOW_AHEAD * settling + longest
-    return ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1
-
-
-def settling_time(machine: Machine, control: Control) -> float:
-    """Time constant of the position loop, s; 0 where all drives are ideal."""
-    lags = any(isinstance(axis.drive, FirstOrderLag) for axis in machine.axes)
-    return min(1.0 / control.position_gain, SLOWEST_LOOP) if lags else 0.0
+    rms: float  # rad
+    max: float  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +81,9 @@ class CaseSummary:
     command: Deviation  # of the command
     drives: Deviation  # of the drives' position through the kinematics
     tool: Deviation  # of drive plus structure
-    following_rms: Mapping[str, float]  # axis: mm or rad
+    following_rms: Mapping[str, float]  # joint: mm or rad
     residual_vibration: Mapping[str, float]  # axis: mm or rad
+    turn: Turn | None = None  # where the machine turns tool or workpiece
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,21 +122,31 @@ class Observer(Protocol):
 class Trial:
     """One case under way: its stages, where they stand, and what they have seen so far."""
 
-    def __init__(self, case: Case, machine: Machine, recorder: Recorder | None = None) -> None:
+    def __init__(
+        self,
+        case: Case,
+        machine: Machine,
+        kinematics: Kinematics = CARTESIAN,
+        recorder: Recorder | None = None,
+    ) -> None:
         self.case = case
         self._machine = machine
         self.recorder = recorder
         period, axes = case.control.sample_time, tuple(axis.name for axis in machine.axes)
         self._shape = command_shaping(case.shaping, axes, period)
-        self._simulate = simulating(machine, case.control)
         self._longer = case.shaping.longer(axes, period)
-        reach = window(settling_time(machine, case.control), self._longer, period)
-        self._measure = measuring(*reach, WINDOW_MARGIN)
+        joints = joints_of(machine, kinematics)
+        self._joints = joints.names
+        reach = foot_reach(settling_time(joints, case.control), self._longer, period)
+        self._simulate = simulating(machine, case.control, kinematics, reach)
+        self._measure = measuring(reach)
         self._shaped: CommandState | None = None
         self._simulated: SimulationState | None = None
         self._measured: MeasuringState | None = None
         self._tallies = [Tally(), Tally(), Tally()]  # of the command, the drives, the tool
-        self._following = np.zeros(len(axes))
+        self._following = np.zeros(len(joints.names))
+        self._turn, self._furthest = np.zeros(1), 0.0  # rad^2, rad: of the tool's direction
+        self._turns = kinematics.turn is not None
         self._samples = 0
         self._cycle_time = 0.0
 
@@ -154,9 +157,11 @@ class Trial:
         command = block.command
         if self.case.shaping.acts:
             self._shaped, command = self._shape(self._shaped, command, block.last)
-        self._simulated, response = self._simulate(self._simulated, command, block.last)
+        self._simulated, response = self._simulate(self._simulated, block.toolpath, command, block.last)
         add_squares(response.following_error, self._following)
         self._samples += len(response.command)
+        add_squares(response.turn[:, None], self._turn)
+        self._furthest = max(self._furthest, float(response.turn.max(initial=0.0)))
         signals = (response.command.position, response.position, response.tool)
         self._measured, errors = self._measure(
             self._measured, block.toolpath, response.command.arc_length, signals, block.last
@@ -181,10 +186,11 @@ class Trial:
         command, drives, tool = (deviation(found) for found in self._tallies)
         following = {
             axis: sqrt(total / self._samples)
-            for axis, total in zip(axes, self._following.tolist(), strict=True)
+            for axis, total in zip(self._joints, self._following.tolist(), strict=True)
         }
         residual = dict(zip(axes, self._simulated.residual.tolist(), strict=True))
-        return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual)
+        turn = Turn(sqrt(float(self._turn[0]) / self._samples), self._furthest) if self._turns else None
+        return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual, turn)
 
 
 def run(
@@ -236,7 +242,10 @@ def run(
                 Recorder(case.name, axes, period, all_signals=all_signals) if record else None
                 for case in cases
             ]
-            trials = [Trial(case, machine, recorder) for case, recorder in zip(cases, recorders, strict=True)]
+            trials = [
+                Trial(case, machine, setup.kinematics, recorder)
+                for case, recorder in zip(cases, recorders, strict=True)
+            ]
         if record and unshaped and block.toolpath is not None:
             outline.add(block.toolpath)
         for watcher in (*trials, *observers):

@@ -12,7 +12,7 @@ and velocity, whose acceleration is linear over the sample; the modes answer tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
@@ -21,8 +21,7 @@ from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.machine import Axis, FirstOrderLag
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Plant:
+class Plant(NamedTuple):
     """Discrete dynamics of all axes: ``x+ = transition x + held u + rising (u_end - u_start)``."""
 
     transition: FloatArray  # (d,s,s)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
+from cnc_shape.kernels.foot_point import PathTable, pack, stack_boxes
 from cnc_shape.kernels.layout import lay_out
 from cnc_shape.toolpath import Toolpath
 
@@ -73,4 +74,13 @@ def since(path: Segments, place: float) -> Segments:
         frozen(path.start[drop:]), frozen(path.end[drop:]), frozen(path.low[drop:]), frozen(path.high[drop:]),
         frozen_integers(path.line[drop:]), frozen_integers(np.where(kept >= 0, kept - gone, -1)),
         frozen(path.arcs[gone:]), frozen(path.boxes[drop:]),
+    )  # fmt: skip
+
+
+def path_table(path: Segments) -> PathTable:
+    """Lay segments, at least one, out for the search of nearest points."""
+    tree, first = stack_boxes(path.boxes)
+    return PathTable(
+        frozen(pack(path.start, path.end, path.low, path.high, path.arc)), path.low, path.high, path.arcs,
+        path.boxes, frozen(tree), frozen_integers(first),
     )  # fmt: skip

@@ -1,25 +1,33 @@
 """Simulation: the servo loop and the structure, sample by sample.
 
-The command, delayed alike on all axes, goes through the machine's loop (`controllers`) and through its
-drives and structure as one linear system (`plant`).
+The command, delayed alike on all axes, goes through the machine's loop and drives joint by joint. Where the
+joints are the axes, drive and structure are one linear system. Elsewhere the structure bends behind what
+the joints make of the axes::
+
+    command --inverse--> joint references --loop, drives--> joints --forward--> position --structure--> tool
+       |                                    ^
+       +--inverse Jacobian, path -----------+ cross-coupling
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.controllers import cross_coupling, feedforward, position_loop
-from cnc_shape.controllers.control import Control
-from cnc_shape.controllers.loop import servo_loop
-from cnc_shape.controllers.stability import check_stability
-from cnc_shape.errors import InfeasibleError
+from cnc_shape.controllers import Control, Estimator
+from cnc_shape.controllers.loop import Command, Memory, Poses
+from cnc_shape.joints import CARTESIAN, Joints, joints_of
+from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine
-from cnc_shape.plant import Plant, discretise
+from cnc_shape.refusals import check_on_the_way, check_own_loops, refuse_divergence, refuse_pose
+from cnc_shape.segments import path_table
+from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
+from cnc_shape.toolpath import Toolpath
 from cnc_shape.trajectory import Trajectory, join_trajectories
+from cnc_shape.windows import Reach, Windows, WindowState, foot_reach, windowing
 
 RESIDUAL_PERIODS = 10.0  # of the slowest mode, watched after the end
 SHORTEST_RESIDUAL_TIME = 0.5  # s
@@ -30,20 +38,22 @@ class Response:
     """What drives and tool did under a command: a chunk of samples."""
 
     command: Trajectory
+    reference: FloatArray  # (n,j) mm or rad, what the drives were told
     joint: FloatArray  # (n,j) mm or rad, position of the drives
     position: FloatArray  # (n,d) mm or rad, of the drives through the kinematics
     tool: FloatArray  # (n,d) mm or rad, drives plus structure
-    drive: FloatArray  # (n,j) mm/s, velocity command of the loop
+    drive: FloatArray  # (n,j) mm/s or rad/s, velocity command of the loop
+    turn: FloatArray  # (n,) rad between the tool's direction and what it should be; (0,): it does not turn
     signals: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
 
     @property
     def following_error(self) -> FloatArray:
-        """Command minus drives, (n,d) mm or rad."""
-        return self.command.position - self.position
+        """What the drives were told minus where they are, (n,j) mm or rad."""
+        return self.reference - self.joint
 
     def summary(self) -> str:
-        """Largest following error and deflection of every axis, in one line."""
-        following = np.abs(self.following_error).max(axis=0, initial=0.0)
+        """Largest lag and deflection of every axis, in one line."""
+        following = np.abs(self.command.position - self.position).max(axis=0, initial=0.0)
         deflection = np.abs(self.tool - self.position).max(axis=0, initial=0.0)
         told = zip(self.command.axes, following.tolist(), deflection.tolist(), strict=True)
         return "; ".join(f"{axis.upper()} follows to {f:.4g}, bends by {d:.4g}" for axis, f, d in told)
@@ -53,11 +63,14 @@ class Response:
 class SimulationState:
     """Where the loop stands between two chunks."""
 
-    plant: FloatArray  # (d,s)
-    late: FloatArray  # (delay,d) commands the drives have yet to hear, oldest first
-    tangent: FloatArray  # (3,) last direction of the command
-    held: Trajectory  # at most one sample, waiting for the one after it
-    time: float  # s, of the next sample
+    loop: Memory
+    structure: Memory | None  # of the axes behind the joints; None where these are the axes
+    begun: bool  # loop and structure rest where the command begins, or have gone on from there
+    held: Trajectory  # samples that wait for the one after them, or for their windows
+    ticks: int  # run so far
+    inverse: FloatArray  # (1,c,c) inverse Jacobian in use, (0,c,c) before the first
+    windows: WindowState | None
+    source: str  # of the toolpath
     settling: FloatArray  # (m,d) mm or rad, tool minus drive at and after the end; (0,d) before
 
     @property
@@ -66,68 +79,56 @@ class SimulationState:
         return np.abs(self.settling).max(axis=0, initial=0.0)
 
 
+SimulationStep = Callable[
+    [SimulationState | None, Toolpath | None, Trajectory, bool], tuple[SimulationState, Response]
+]
+
+
 def simulating(
-    machine: Machine, control: Control
-) -> Callable[[SimulationState | None, Trajectory, bool], tuple[SimulationState | None, Response]]:
+    machine: Machine, control: Control, kinematics: Kinematics = CARTESIAN, reach: Reach | None = None
+) -> SimulationStep:
     """Return the resumable stage that runs a command through a machine's loop and structure.
 
-    The machine's axes are the command's, in its order. A tick needs the sample after it, so the stage
-    holds one sample back; after the last one the command rests.
+    Its step takes the toolpath that has come in (or None), the samples that run on it, and whether that was
+    all. A tick needs the sample after it, so the stage holds samples back; after the last one the command
+    rests. The path matters where the loop looks for foot points on it, and to name the line of a pose that
+    the machine cannot hold.
+
+    Parameters
+    ----------
+    machine
+        Its axes are the command's, in its order.
+    control
+        The loop; its sample time must be the command's.
+    kinematics
+        What the joints make of the axes.
+    reach
+        Of the windows in which foot points are sought; None: that of the position loop.
 
     Raises
     ------
     InfeasibleError
-        A loop that is unstable, before anything is simulated; a signal that leaves all bounds.
+        A loop that is unstable, before anything is simulated; a pose that is out of reach or singular names
+        its line; a signal that leaves all bounds.
     """
-    axes = machine.axes
-    plant = discretise(axes, control.sample_time)
-    check_stability(axes, control)
-    position_gains = position_loop.PositionGains(frozen([control.position_gain] * len(axes)))
-    feed_gains = feedforward.gains(control.feedforward or feedforward.Feedforward(), axes)
-    couple_gains = cross_coupling.CrossCouplingGains(
-        control.cross_coupling.proportional if control.cross_coupling else 0.0
-    )
-
-    def run(state: SimulationState, position: FloatArray, velocity: FloatArray) -> tuple[FloatArray, ...]:
-        return servo_loop(
-            position, velocity, control.sample_time,
-            plant.transition, plant.held, plant.rising, plant.states, plant.ideal,
-            position_gains, int(control.feedforward is not None), feed_gains,
-            int(control.cross_coupling is not None), couple_gains,
-            state.plant, state.late, state.tangent,
-        )  # fmt: skip
-
-    def step(
-        state: SimulationState | None, command: Trajectory, last: bool
-    ) -> tuple[SimulationState | None, Response]:
-        if state is None and len(command) == 0:
-            return None, Response(
-                command, command.position, command.position, command.position, command.position
-            )
-        now = _start(plant, command, control) if state is None else _copy(state)
-        command = join_trajectories([now.held, command])
-        ticks = len(command) if last else max(len(command) - 1, 0)
-        rest = command.position[-1:] if last else command.position[:0]
-        position = np.concatenate([command.position, rest])
-        velocity = np.concatenate([command.velocity, np.zeros_like(rest)])
-        joint, tool, drive = run(now, position, velocity)
-        _refuse_divergence(tool, drive, now.time, machine, control)
-        settling = now.settling
-        if last and len(command):
-            after = np.repeat(rest, _residual_ticks(machine, control) + 1, axis=0)
-            still, shaken, _ = run(now, after, np.zeros_like(after))
-            settling = np.vstack([tool[-1:] - joint[-1:], shaken - still])
-        response = Response(
-            command.cut(slice(0, ticks)), frozen(joint), frozen(joint), frozen(tool), frozen(drive)
-        )
-        held = command.cut(slice(ticks, None))
-        time = now.time + ticks * control.sample_time
-        return SimulationState(now.plant, now.late, now.tangent, held, time, frozen(settling)), response
-
-    return step
+    joints = joints_of(machine, kinematics)
+    check_own_loops(joints, control)
+    return _Stage(
+        machine,
+        control,
+        joints,
+        reach or foot_reach(settling_time(joints, control), 0.0, control.sample_time),
+    ).step
 
 
-def simulate(command: Trajectory, machine: Machine, control: Control) -> Response:
+def simulate(
+    command: Trajectory,
+    machine: Machine,
+    control: Control,
+    kinematics: Kinematics = CARTESIAN,
+    toolpath: Toolpath | None = None,
+    reach: Reach | None = None,
+) -> Response:
     """Run a whole command through a machine.
 
     Parameters
@@ -136,31 +137,176 @@ def simulate(command: Trajectory, machine: Machine, control: Control) -> Respons
         The (shaped) axis commands.
     machine
         Drives and structure; axes it lacks are ideal.
-    control
-        The loop; its sample time must be the command's.
+    control, kinematics, reach
+        As `simulating`.
+    toolpath
+        What the command runs on; cross-coupling by foot points needs it.
     """
-    return simulating(machine.with_axes(command.axes), control)(None, command, True)[1]
+    step = simulating(machine.with_axes(command.axes), control, kinematics, reach)
+    return step(None, toolpath, command, True)[1]
 
 
-def _start(plant: Plant, command: Trajectory, control: Control) -> SimulationState:
-    if command.sample_time != control.sample_time:
-        raise ValueError(f"{command.sample_time=} {control.sample_time=}")
-    state = np.zeros(plant.held.shape)
-    state[:, 0] = command.position[0]
-    axes = len(command.axes)
-    return SimulationState(
-        state,
-        np.zeros((control.delay_samples, axes)),
-        np.zeros(3),
-        command.cut(slice(0, 0)),
-        0.0,
-        np.zeros((0, axes)),
-    )
+class _Stage:
+    """The stage's settings; all that changes is in the state."""
+
+    def __init__(self, machine: Machine, control: Control, joints: Joints, reach: Reach) -> None:
+        self._control, self._joints, self._period = control, joints, control.sample_time
+        self._watched = _residual_ticks(machine, control)
+        self._loop = make_loop(joints, control)
+        self._structure = None if joints.cartesian else structure_of(machine, self._period)
+        coupling = control.cross_coupling
+        self._searches = coupling is not None and coupling.estimator is Estimator.FOOT_POINT
+        self._coupled = coupling is not None and not joints.cartesian
+        self._windows = None
+        if self._searches or not joints.cartesian:
+            self._windows = windowing(replace(reach, ahead=max(reach.ahead, 1)))
+
+    def step(
+        self, state: SimulationState | None, toolpath: Toolpath | None, command: Trajectory, last: bool
+    ) -> tuple[SimulationState, Response]:
+        now = self._start(command) if state is None else _copy(state)
+        if not now.begun and len(command):
+            now = self._begin(now, command)
+        source = now.source if toolpath is None else toolpath.source
+        places, windows = now.windows, None
+        if self._windows is not None:
+            places, windows = self._windows(places, toolpath, command.arc_length, last)
+        command = join_trajectories([now.held, command])
+        ticks = len(command) if last else max(len(command) - 1, 0)
+        if windows is not None:
+            ticks = windows.lower.size
+        held = command.cut(slice(ticks, None))
+        if ticks == 0:
+            kept = replace(now, held=held, windows=places, source=source)
+            return kept, self._nothing(command.cut(slice(0, 0)))
+        pose, told = self._told(command, ticks)
+        if windows is not None:
+            refuse_pose(self._joints, pose, command.arc_length, windows, source)
+        poses, inverse = self._poses(now, pose, ticks)
+        if self._coupled:
+            check_on_the_way(self._joints, self._control, pose, told.velocity, now.ticks, source)
+        ran = self._loop.run(now.loop, told, poses, self._path(windows))
+        before = now.ticks * self._period
+        refuse_divergence(self._joints, told.reference, ran, before, self._period, source)
+        position, tool, turn = self._axes(now, pose, ran)
+        response = Response(
+            command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
+            ran.drive, turn,
+        )  # fmt: skip
+        settling = now.settling
+        if last:
+            settling = self._settle(now, poses, told, windows, tool[-1:] - position[-1:])
+        done = now.ticks + ticks
+        return SimulationState(
+            now.loop, now.structure, True, held, done, inverse, places, source, settling
+        ), response
+
+    def _start(self, command: Trajectory) -> SimulationState:
+        if command.sample_time != self._period:
+            raise ValueError(f"{command.sample_time=} {self._period=}")
+        if (
+            self._control.cross_coupling is not None
+            and self._control.cross_coupling.estimator is not Estimator.TANGENT
+            and len(command.axes) < 3
+        ):
+            raise ValueError(f"{command.axes=}: circles and foot points are of space")
+        nowhere = self._loop.start(np.zeros(len(self._joints.drives)))
+        bent = None if self._structure is None else self._structure.start(np.zeros(len(command.axes)))
+        none = frozen(np.zeros((0, self._joints.coupled, self._joints.coupled)))
+        return SimulationState(
+            nowhere, bent, False, command.cut(slice(0, 0)), 0, none, None, "",
+            frozen(np.zeros((0, len(command.axes)))),
+        )  # fmt: skip
+
+    def _begin(self, now: SimulationState, command: Trajectory) -> SimulationState:
+        """Rest where the command begins."""
+        at = command.position[:1]
+        loop = self._loop.start(self._joints.inverse(self._joints.pose(at))[0])
+        bent = None if self._structure is None else self._structure.start(at[0])
+        return replace(now, loop=loop, structure=bent, begun=True)
+
+    def _nothing(self, command: Trajectory) -> Response:
+        none = frozen(np.zeros((0, len(self._joints.drives))))
+        return Response(command, none, none, command.position, command.position, none, frozen([]))
+
+    def _told(self, command: Trajectory, ticks: int) -> tuple[FloatArray, Command]:
+        """Poses and what the loop is told, one sample more than ticks: after the last, rest."""
+        rows = min(ticks + 1, len(command))
+        position, velocity, acceleration = (
+            values[:rows] for values in (command.position, command.velocity, command.acceleration)
+        )
+        if rows == ticks:
+            position = np.vstack([position, position[-1:]])
+            velocity, acceleration = (
+                np.vstack([values, np.zeros_like(position[-1:])]) for values in (velocity, acceleration)
+            )
+        pose = self._joints.pose(frozen(position))
+        rates = self._joints.rates(pose, self._joints.pose(frozen(velocity)))
+        return pose, Command(
+            frozen(position), frozen(velocity), frozen(acceleration), self._joints.inverse(pose), rates
+        )
+
+    def _poses(self, now: SimulationState, pose: FloatArray, ticks: int) -> tuple[Poses, FloatArray]:
+        """Inverse Jacobians for some ticks, and the one in use at their end."""
+        if not self._coupled:
+            return NO_POSES, now.inverse
+        every = self._control.jacobian_every
+        phase = now.ticks % every
+        inverse = self._joints.inverse_jacobian(frozen(pose[-phase % every : ticks : every]))
+        if phase:
+            inverse = frozen(np.concatenate([now.inverse, inverse]))
+        return Poses(inverse, phase, every), frozen(inverse[-1:])
+
+    def _path(self, windows: Windows | None) -> PathWindows:
+        if windows is None or not self._searches:
+            return PathWindows()
+        if windows.path.low.size == 0:
+            raise ValueError("cross-coupling by foot points needs a path")
+        return PathWindows(path_table(windows.path), windows.lower, windows.upper)
+
+    def _axes(
+        self, now: SimulationState, pose: FloatArray, ran: Ticks
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position of the drives through the kinematics, of the tool, and how far it is turned."""
+        if self._structure is None or now.structure is None:
+            return ran.joint, ran.tool, frozen([])
+        n = ran.joint.shape[0]
+        joint = np.vstack([ran.joint, now.loop.plant[None, :, 0]])
+        rate = np.vstack([ran.rate, now.loop.plant[None, :, 1]])
+        there = self._joints.forward(frozen(joint), pose)
+        position = self._joints.axes(there)
+        turn = self._joints.kinematics.turn
+        own = self._joints.coupled
+        turned = frozen([]) if turn is None else turn(frozen(pose[:n, :own]), frozen(there[:n, :own]))
+        if not self._structure.bends:
+            return frozen(position[:n]), frozen(position[:n]), turned
+        velocity = self._joints.axes(self._joints.velocity(there, frozen(rate)))
+        told = Command(position, velocity, velocity, position, velocity)
+        tool = self._structure.run(now.structure, told, NO_POSES, PathWindows()).tool
+        return frozen(position[:n]), tool, turned
+
+    def _settle(
+        self, now: SimulationState, poses: Poses, told: Command, windows: Windows | None, ending: FloatArray
+    ) -> FloatArray:
+        """Tool minus drives from the end on, the command at rest."""
+        n = self._watched
+        position = np.repeat(told.position[-1:], n + 1, axis=0)
+        reference = np.repeat(told.reference[-1:], n + 1, axis=0)
+        still, quiet = np.zeros_like(position), np.zeros_like(reference)
+        rest = Command(frozen(position), frozen(still), frozen(still), frozen(reference), frozen(quiet))
+        last = Poses(frozen(poses.inverse[-1:]), 0, n + 1) if len(poses.inverse) else NO_POSES
+        path = self._path(windows)
+        around = PathWindows(
+            path.path, frozen(np.repeat(path.lower[-1:], n)), frozen(np.repeat(path.upper[-1:], n))
+        )
+        ran = self._loop.run(now.loop, rest, last, around)
+        position, tool, _ = self._axes(now, self._joints.pose(rest.position), ran)
+        return frozen(np.vstack([ending, tool - position]))
 
 
 def _copy(state: SimulationState) -> SimulationState:
-    return SimulationState(
-        state.plant.copy(), state.late.copy(), state.tangent.copy(), state.held, state.time, state.settling
+    return replace(
+        state, loop=copied(state.loop), structure=None if state.structure is None else copied(state.structure)
     )
 
 
@@ -168,17 +314,3 @@ def _residual_ticks(machine: Machine, control: Control) -> int:
     periods = [mode.damped_period for axis in machine.axes for mode in axis.modes]
     watched = max(RESIDUAL_PERIODS * max(periods, default=0.0), SHORTEST_RESIDUAL_TIME)
     return int(np.ceil(watched / control.sample_time))
-
-
-def _refuse_divergence(
-    tool: FloatArray, drive: FloatArray, start: float, machine: Machine, control: Control
-) -> None:
-    """Stop at the first sample that is not a number, naming axis and time."""
-    bad = ~(np.isfinite(tool) & np.isfinite(drive))
-    if bad.any():
-        row, axis = (int(index) for index in np.argwhere(bad)[0])
-        raise InfeasibleError(
-            f"the loop diverged: axis {machine.axes[axis].name} has left all bounds at t = "
-            f"{start + row * control.sample_time:.4f} s",
-            hint="lower the gains",
-        )

@@ -17,15 +17,18 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup, Shaping
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.errors import OptionError
+from cnc_shape.joints import joints_of
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import Block
-from cnc_shape.pipeline import WINDOW_MARGIN, Deviation, deviation, settling_time, window
+from cnc_shape.pipeline import Deviation, deviation
 from cnc_shape.program import ROTARY
+from cnc_shape.servo import settling_time
 from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.shapers.shaper import NONE as UNSHAPED
 from cnc_shape.simulation import Response, SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
+from cnc_shape.windows import foot_reach
 
 KINDS = {
     Shaping.NONE: "unshaped",
@@ -161,7 +164,7 @@ class ModelTrial:
         self._shaped, command = self._shape(self._shaped, block.command, block.last)
         responses: list[Response] = []
         for k, simulate in enumerate(self._simulate):
-            self._states[k], response = simulate(self._states[k], command, block.last)
+            self._states[k], response = simulate(self._states[k], block.toolpath, command, block.last)
             responses.append(response)
         said, nominal = responses[0].command, responses[0].position
         signals = (said.position, nominal, *(response.tool for response in responses))
@@ -189,9 +192,12 @@ class ModelTrial:
         self._axes, self.begun = axes, True
         self._longer = self._how.longer(axes, period)
         self._shape = command_shaping(self._how, axes, period)
-        self._simulate = [simulating(off_by(machine, model), self._control) for model in self._models]
-        reach = window(settling_time(machine, self._control), self._longer, period)
-        self._measure = measuring(*reach, WINDOW_MARGIN)
+        kinematics = self._setup.kinematics
+        reach = foot_reach(settling_time(joints_of(machine, kinematics), self._control), self._longer, period)
+        self._simulate = [
+            simulating(off_by(machine, model), self._control, kinematics, reach) for model in self._models
+        ]
+        self._measure = measuring(reach)
 
 
 def _timings(setup: Setup) -> dict[Shaping, Timing]:

@@ -15,9 +15,10 @@ from paths import arc, dwell, line, rows, toolpath
 from scipy.optimize import minimize_scalar
 
 from cnc_shape.arrays import frozen, frozen_integers
-from cnc_shape.contour import ContourError, Tally, contour_error, foot_windows, measuring, tally
+from cnc_shape.contour import ContourError, Tally, contour_error, measuring, tally
 from cnc_shape.kernels.foot_point import points_at
-from cnc_shape.segments import segments, since
+from cnc_shape.segments import path_table, segments, since
+from cnc_shape.windows import Reach, foot_windows
 
 TURN = 2.0 * np.pi
 
@@ -305,7 +306,7 @@ def test_rows_without_travel_are_passed_over():
 
 def streamed(path, place, signals, cuts, path_cuts, back, ahead, margin):
     """Run the stage over chunks; each path chunk comes before the samples that run on it."""
-    step, state, parts, seen = measuring(back, ahead, margin), None, [], 0
+    step, state, parts, seen = measuring(Reach(back, ahead, margin)), None, [], 0
     bounds = [0, *cuts, len(place)]
     path_bounds = [0, *path_cuts, len(path)]
     for low, high in pairwise(bounds):
@@ -384,7 +385,7 @@ def test_a_sample_waits_for_the_move_that_begins_where_its_window_ends(seed):
     place = path.arc_length[:2]
     signal = path.end[[0, 0], :3] + 0.1 * rng.normal(size=(2, 3))
     expected = contour_error(signal, path, *foot_windows(place, 0, 0, 0.0))
-    step = measuring(0, 0, 0.0)
+    step = measuring(Reach(0, 0, 0.0))
     state, first = step(None, rows(path, 0, 1), place, (signal,), False)
     state, second = step(state, rows(path, 1, 2), place[:0], (signal[:0],), True)
     assert_array_equal(np.concatenate([first[0].distance, second[0].distance]), expected.distance)
@@ -392,13 +393,13 @@ def test_a_sample_waits_for_the_move_that_begins_where_its_window_ends(seed):
 
 @pytest.mark.parametrize(("back", "ahead"), [(0, 0), (1, 0), (20, 10)])
 def test_memory_does_not_grow_with_the_path(back, ahead):
-    step, state, held = measuring(back, ahead, 0.5), None, []
+    step, state, held = measuring(Reach(back, ahead, 0.5)), None, []
     for k in range(50):
         path = toolpath(*[line(10.0 * k + 0.1 * j, 0.0) for j in range(1, 101)], start=(10.0 * k, 0.0, 0.0))
         path = replace(path, arc_length=frozen(path.arc_length + 10.0 * k))
         place = 10.0 * k + np.linspace(0.0, 9.0, 100)
         state, _ = step(state, path, place, (np.stack([place, 0 * place, 0 * place], axis=1),), False)
-        held.append(state.path.low.size)
+        held.append(state.windows.path.low.size)
     assert max(held) <= 300
 
 
@@ -439,7 +440,7 @@ def test_segments_stand_for_the_programmed_curves_and_lie_in_their_boxes(seed):
         points = naive.curve_points(path, row, shares)
         at = frozen(naive.places(path, row, shares))
         rows_ = frozen_integers(np.full(at.size, row))
-        found = points_at(at, rows_, laid.start, laid.end, laid.low, laid.high, laid.arc, laid.arcs)
+        found = points_at(at, rows_, path_table(laid))
         assert_allclose(found, points, atol=1e-7)
         assert (laid.boxes[row, :3] <= points).all()
         assert (points <= laid.boxes[row, 3:]).all()

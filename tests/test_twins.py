@@ -13,6 +13,7 @@ KERNEL = re.compile(r"^@kernel\ndef (\w+)", re.MULTILINE)
 # one another; those that are called from outside are compared, and the rest with them.
 TWINS = {
     "controllers/cross_coupling.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/estimators.py": ("naive.servo_loop", "test_loop.py"),
     "controllers/feedforward.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/loop.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/position_loop.py": ("naive.servo_loop", "test_simulation.py"),

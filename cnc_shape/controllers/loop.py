@@ -5,78 +5,155 @@ One tick, in this order: the drives are measured; the loop's terms add up to a v
 plant runs to the next sample with that command held. Every term stands behind a flag of its own,
 so that leaving one out is a line of configuration and costs nothing. A new term is its file and one
 line here.
+
+The loop runs in the joints of the machine. What cross-coupling needs of the kinematics is an array: the
+inverse Jacobian at the commanded poses. With it joint errors become Cartesian ones, and Cartesian velocities
+joint velocities. Where the joints are the axes there is none.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from cnc_shape.controllers import cross_coupling, feedforward, position_loop
+from cnc_shape.arrays import FloatArray, IntArray
+from cnc_shape.controllers import cross_coupling, estimators, feedforward, position_loop
 from cnc_shape.kernels import kernel
+from cnc_shape.kernels.linear import solve
+
+FURTHEST = 1e6  # mm or rad, following error beyond which the loop has diverged
+FOOT_POINT = cross_coupling.Estimator.FOOT_POINT.value
+CIRCLE = cross_coupling.Estimator.CIRCLE.value
+
+
+class Command(NamedTuple):
+    """What the loop is told: one sample more than it runs ticks."""
+
+    position: FloatArray  # (n+1,d) mm or rad, of the axes
+    velocity: FloatArray  # (n+1,d)
+    acceleration: FloatArray  # (n+1,d)
+    reference: FloatArray  # (n+1,j) mm or rad, of the joints
+    reference_velocity: FloatArray  # (n+1,j)
+
+
+class Poses(NamedTuple):
+    """Inverse Jacobians at commanded poses: `inverse[(phase + k) // every]` holds at tick k."""
+
+    inverse: FloatArray  # (r,c,c) joint rates per axis rates of the first c joints; (0,0,0): joints are axes
+    phase: int  # ticks
+    every: int  # ticks
+
+
+class Memory(NamedTuple):
+    """What the loop remembers from tick to tick; changed in place."""
+
+    plant: FloatArray  # (j,s)
+    late: FloatArray  # (delay,j) commands the drives have yet to hear, oldest first
+    frame: FloatArray  # (2,3) unit tangent of the command, its curvature in 1/mm
+    coupling: FloatArray  # (3,3) of the cross-coupled controller
+    cursor: IntArray  # (4,) of the search for foot points
 
 
 @kernel
 def servo_loop(
-    position, velocity, sample_time, transition, held, rising, states, ideal,
-    position_gains, feed, feed_gains, couple, couple_gains, plant, late, tangent,
+    command, poses, path, lower, upper, sample_time, plant, position_gains, feed, feed_gains, couple,
+    couple_gains, memory,
 ):  # fmt: skip
-    """Run n ticks of the loop, Cartesian machine: joints are axes.
+    """Run n ticks of the loop.
 
-    position, velocity (n+1,d) of the command; transition (d,s,s), held, rising (d,s), states, ideal (d,)
-    of the plant; feed, couple: 1 where that term acts. plant (d,s), late (k,d) and tangent (3,) are
-    changed in place. Returns drive position, tool and velocity command, (n,d) each.
+    command: a `Command`; poses: `Poses`; path, lower (n,), upper (n,) mm: the path and every tick's window on
+    it, where foot points are asked for; plant: a `Plant` of the joints; feed, couple: 1 where that term
+    acts; memory: a `Memory`. Returns joint, its rate, tool and velocity command, (n,j) each, and the ticks
+    run: fewer than n where the loop diverged.
     """
-    n, axes = position.shape[0] - 1, position.shape[1]
-    joint, tool, drive = np.empty((n, axes)), np.empty((n, axes)), np.empty((n, axes))
-    following, mean_velocity, mean_acceleration = np.empty(axes), np.empty(axes), np.empty(axes)
-    command = np.empty(axes)
+    position, velocity, acceleration, reference, reference_velocity = command
+    inverse, phase, every = poses
+    transition, held, rising, states, ideal = plant
+    state, late, frame, coupling, cursor = memory
+    n, joints = reference.shape[0] - 1, reference.shape[1]
+    linear = min(3, position.shape[1])
+    cartesian = inverse.shape[0] == 0
+    solved = inverse.shape[1]
+    joint, rate = np.empty((n, joints)), np.empty((n, joints))
+    tool, drive = np.empty((n, joints)), np.empty((n, joints))
+    mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints)
+    following = np.zeros(max(joints, 3))
+    told = np.empty(joints)
+    tracking = following if cartesian else np.zeros(max(joints, 3))
+    coupled, work = following[:solved], np.empty((solved, solved))
+    error, speed = np.zeros(3), np.zeros(3)
+    searched = n if couple and couple_gains.estimator == FOOT_POINT else 0
+    tools, feet = np.empty((searched, 3)), np.empty((searched, 3))
+    distance, place, segment = np.empty(searched), np.empty(searched), np.empty(searched, np.int64)
     for k in range(n):
-        speed_v2 = 0.0
-        for a in range(axes):
-            joint[k, a] = plant[a, 0]
-            tool[k, a] = plant[a, 0]
-            for i in range(2, states[a], 2):
-                tool[k, a] += plant[a, i]
-            following[a] = position[k, a] - plant[a, 0]
-            command[a] = 0.0
-            mean_velocity[a] = (position[k + 1, a] - position[k, a]) / sample_time
-            mean_acceleration[a] = (velocity[k + 1, a] - velocity[k, a]) / sample_time
-            if a < 3:
-                speed_v2 += velocity[k, a] ** 2
-        if speed_v2 > 0.0:
-            for a in range(3):
-                tangent[a] = velocity[k, a] / np.sqrt(speed_v2)
-        position_loop.step(position_gains, following, command)
+        for j in range(joints):
+            joint[k, j], rate[k, j] = state[j, 0], state[j, 1]
+            tool[k, j] = state[j, 0]
+            for i in range(2, states[j], 2):
+                tool[k, j] += state[j, i]
+            following[j] = reference[k, j] - state[j, 0]
+            if not abs(following[j]) <= FURTHEST:
+                return joint, rate, tool, drive, k
+            told[j] = 0.0
+        position_loop.step(position_gains, following, told)
         if feed:
-            feedforward.step(feed_gains, mean_velocity, mean_acceleration, command)
+            for j in range(joints):
+                mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
+                mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
+            feedforward.step(feed_gains, mean_velocity, mean_acceleration, told)
         if couple:
-            cross_coupling.step(couple_gains, following, tangent, command)
-        for a in range(axes):
-            drive[k, a] = command[a]
-            s = states[a]
-            if ideal[a]:
+            estimators.look_ahead(velocity, acceleration, k, couple_gains.estimator == CIRCLE, frame)
+            row = 0 if cartesian else (phase + k) // every
+            if not cartesian:
+                solve(inverse[row], coupled, tracking, work)
+            if couple_gains.estimator == FOOT_POINT:
+                estimators.foot_error(
+                    position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment,
+                    error,
+                )  # fmt: skip
+            elif couple_gains.estimator == CIRCLE:
+                estimators.circle_error(tracking, frame, error)
+            else:
+                estimators.tangent_error(tracking, frame, error)
+            cross_coupling.step(couple_gains, error, frame, sample_time, coupling, speed)
+            if cartesian:
+                for i in range(linear):
+                    told[i] += speed[i]
+                for j in range(3, joints):
+                    told[j] += couple_gains.orientation * tracking[j]
+            else:
+                for j in range(solved):
+                    for i in range(3):
+                        told[j] += inverse[row, j, i] * speed[i]
+                    for i in range(3, solved):
+                        told[j] += inverse[row, j, i] * couple_gains.orientation * tracking[i]
+        for j in range(joints):
+            drive[k, j] = told[j]
+            s = states[j]
+            if ideal[j]:
                 # acceleration of the cubic through both samples: c0 at its start, c1 more at its end
-                step = position[k + 1, a] - position[k, a]
-                v0, v1 = velocity[k, a], velocity[k + 1, a]
+                step = reference[k + 1, j] - reference[k, j]
+                v0, v1 = reference_velocity[k, j], reference_velocity[k + 1, j]
                 c0 = (6.0 * step / sample_time - 4.0 * v0 - 2.0 * v1) / sample_time
                 c1 = (6.0 * v0 + 6.0 * v1 - 12.0 * step / sample_time) / sample_time
             else:
-                c0, c1 = command[a], 0.0
+                c0, c1 = told[j], 0.0
                 if late.shape[0] > 0:
-                    c0 = late[0, a]
+                    c0 = late[0, j]
                     for i in range(late.shape[0] - 1):
-                        late[i, a] = late[i + 1, a]
-                    late[late.shape[0] - 1, a] = command[a]
+                        late[i, j] = late[i + 1, j]
+                    late[late.shape[0] - 1, j] = told[j]
             # the drive answers itself alone, a mode the drive and itself: all else in `transition` is zero
-            q, v = plant[a, 0], plant[a, 1]
+            q, v = state[j, 0], state[j, 1]
             for i in range(2, s, 2):
-                d, w = plant[a, i], plant[a, i + 1]
-                for j in range(i, i + 2):
-                    free = transition[a, j, 0] * q + transition[a, j, 1] * v
-                    free += transition[a, j, i] * d + transition[a, j, i + 1] * w
-                    plant[a, j] = held[a, j] * c0 + rising[a, j] * c1 + free
-            for j in range(2):
-                free = transition[a, j, 0] * q + transition[a, j, 1] * v
-                plant[a, j] = held[a, j] * c0 + rising[a, j] * c1 + free
-            if ideal[a]:
-                plant[a, 0] = position[k + 1, a]
-                plant[a, 1] = velocity[k + 1, a]
-    return joint, tool, drive
+                d, w = state[j, i], state[j, i + 1]
+                for r in range(i, i + 2):
+                    free = transition[j, r, 0] * q + transition[j, r, 1] * v
+                    free += transition[j, r, i] * d + transition[j, r, i + 1] * w
+                    state[j, r] = held[j, r] * c0 + rising[j, r] * c1 + free
+            for r in range(2):
+                free = transition[j, r, 0] * q + transition[j, r, 1] * v
+                state[j, r] = held[j, r] * c0 + rising[j, r] * c1 + free
+            if ideal[j]:
+                state[j, 0] = reference[k + 1, j]
+                state[j, 1] = reference_velocity[k + 1, j]
+    return joint, rate, tool, drive, n

@@ -2,9 +2,11 @@
 """The nearest point of a path of lines and arcs, within a window of its length."""
 
 from math import inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
+from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.arcs import TWO_PI, angle_at, length_at, nearest_on_arc, reach
 
@@ -159,9 +161,21 @@ def descend(table, guess, begin, finish, x, y, z):
     return best
 
 
+class PathTable(NamedTuple):
+    """A path laid out for the search."""
+
+    table: FloatArray  # (m,11) from `pack`
+    low: FloatArray  # (m,) mm of path, where the segments start
+    high: FloatArray  # (m,) mm of path, where they end
+    arcs: FloatArray  # (a,17) as kernels/arcs.py lays it out
+    boxes: FloatArray  # (m,6) mm, lowest and highest x, y, z
+    tree: FloatArray  # (b,6) from `stack_boxes`
+    first: IntArray  # (l+1,) from `stack_boxes`
+
+
 @kernel
-def feet(points, lower, upper, table, low, high, arcs, boxes, tree, first):
-    """Nearest points of the path, each within its own window of it.
+def seek_feet(points, lower, upper, start, stop, path, cursor, distance, place, segment):
+    """Nearest points of the path for the rows from `start` to before `stop`, each within its own window.
 
     The least squared distance of all segments in the window wins; among equals, the smallest place.
     The search goes through the segments that touch the window, in order, and leaves out each box that is
@@ -169,14 +183,15 @@ def feet(points, lower, upper, table, low, high, arcs, boxes, tree, first):
     before by as much as that one moved. With it, nearly all boxes are out of reach. Both only spare work:
     what is passed over is farther by more than any rounding, so the result does not depend on them.
 
-    points (n,3) mm; lower, upper (n,) mm of path; table (m,11) from `pack`; low, high (m,) mm of path;
-    arcs (a,17); boxes (m,6); tree (b,6), first (l+1,) from `stack_boxes`.
-    Returns distance (n,), place (n,), segment (n,).
+    points (n,3) mm; lower, upper (n,) mm of path; path: a `PathTable`; cursor (4,): first and last segment
+    of the window before, its foot's segment, and how far that moved. Changed in place: cursor, and the rows
+    of distance (n,), place (n,), segment (n,).
     """
-    n, m, levels = points.shape[0], low.size, first.size - 1
-    distance, place, segment = np.empty(n), np.empty(n), np.empty(n, np.int64)
-    begin = finish = foot = advance = 0
-    for k in range(n):
+    table, low, high, arcs, boxes, tree, first = path
+    m, levels = low.size, first.size - 1
+    begin, finish = min(cursor[0], m - 1), min(cursor[1], m - 1)
+    foot, advance = min(cursor[2], m - 1), cursor[3]
+    for k in range(start, stop):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         window_low = min(max(lower[k], low[0]), high[m - 1])
         window_high = max(min(upper[k], high[m - 1]), window_low)
@@ -207,8 +222,8 @@ def feet(points, lower, upper, table, low, high, arcs, boxes, tree, first):
                     continue
                 j = (block + 1) << (FAN_BITS * level)
             else:
-                stop = min((j | (FAN - 1)) + 1, finish + 1)
-                while j < stop:
+                last = min((j | (FAN - 1)) + 1, finish + 1)
+                while j < last:
                     if j == tried:
                         j += 1
                         continue
@@ -232,29 +247,47 @@ def feet(points, lower, upper, table, low, high, arcs, boxes, tree, first):
         distance[k], segment[k] = sqrt(best), foot
         place[k] = min(max(best_place, window_low), window_high)
         advance = foot - before
+    cursor[0], cursor[1], cursor[2], cursor[3] = begin, finish, foot, advance
+
+
+@kernel
+def feet(points, lower, upper, path):
+    """Nearest points of the path, each within its own window of it.
+
+    points (n,3) mm; lower, upper (n,) mm of path; path: a `PathTable`.
+    Returns distance (n,), place (n,), segment (n,).
+    """
+    n = points.shape[0]
+    distance, place, segment = np.empty(n), np.empty(n), np.empty(n, np.int64)
+    seek_feet(points, lower, upper, 0, n, path, np.zeros(4, np.int64), distance, place, segment)
     return distance, place, segment
 
 
 @kernel
-def points_at(place, segment, start, end, low, high, arc, arcs):
-    """Points of the path at `place` (n,) mm, on `segment` (n,): (n,3) mm."""
+def point_at(table, arcs, place, j, out, k):
+    """Point of the path at `place` mm, on segment j, into row k of `out` (n,3) mm."""
+    along = place - table[j, 8]
+    if table[j, 7] < 0.0:
+        share = along * table[j, 10]
+        for i in range(3):
+            out[k, i] = table[j, i] + share * table[j, 3 + i]
+        return
+    a = int(table[j, 7])
+    angle = angle_at(arcs, a, along, table[j, 9])
+    r = arcs[a, 12] + arcs[a, 13] * angle
+    for i in range(3):
+        out[k, i] = (
+            arcs[a, i]
+            + r * (np.cos(angle) * arcs[a, 3 + i] + np.sin(angle) * arcs[a, 6 + i])
+            + arcs[a, 14] * angle * arcs[a, 9 + i]
+        )
+
+
+@kernel
+def points_at(place, segment, path):
+    """Points of the path at `place` (n,) mm, on `segment` (n,): (n,3) mm. path: a `PathTable`."""
+    table, arcs = path.table, path.arcs
     out = np.empty((place.size, 3))
     for k in range(place.size):
-        j = segment[k]
-        length = high[j] - low[j]
-        along = place[k] - low[j]
-        if arc[j] < 0:
-            share = along / length if length > 0.0 else 0.0
-            for i in range(3):
-                out[k, i] = start[j, i] + share * (end[j, i] - start[j, i])
-            continue
-        a = arc[j]
-        angle = angle_at(arcs, a, along, length)
-        r = arcs[a, 12] + arcs[a, 13] * angle
-        for i in range(3):
-            out[k, i] = (
-                arcs[a, i]
-                + r * (np.cos(angle) * arcs[a, 3 + i] + np.sin(angle) * arcs[a, 6 + i])
-                + arcs[a, 14] * angle * arcs[a, 9 + i]
-            )
+        point_at(table, arcs, place[k], segment[k], out, k)
     return out

@@ -7,7 +7,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen, frozen_integers
 from cnc_shape.kernels.foot_point import points_at
 from cnc_shape.recording.extremes import BUCKETS, Extremes
-from cnc_shape.segments import segments
+from cnc_shape.segments import path_table, segments
 from cnc_shape.toolpath import Toolpath
 
 OUTLINE_ANGLE = 0.05  # rad, of a chord that stands for an arc in a drawing
@@ -31,16 +31,7 @@ class Outline:
         row = np.repeat(np.arange(chords.size), chords)
         share = (np.arange(row.size) - np.repeat(np.cumsum(chords) - chords, chords) + 1) / chords[row]
         place = path.low[row] + share * (path.high[row] - path.low[row])
-        points = points_at(
-            frozen(place),
-            frozen_integers(row),
-            path.start,
-            path.end,
-            path.low,
-            path.high,
-            path.arc,
-            path.arcs,
-        )
+        points = points_at(frozen(place), frozen_integers(row), path_table(path))
         if not self._begun:
             self._points.add(path.start[:1])
         self._points.add(points)

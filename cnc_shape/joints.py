@@ -1,0 +1,104 @@
+"""Joints: what moves a machine's axes, on the axes that a program has.
+
+A pose has the axes of the kinematics first, then those that the program moves besides. Rotary axes of the
+kinematics that the program does not name rest at 0; each of the others is a joint of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.kinematics import Kinematics, cartesian
+from cnc_shape.machine import LINEAR_DEFAULT, Axis, IdealDrive, Machine
+
+CARTESIAN = cartesian()
+
+
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """The joints of a machine under one kinematics."""
+
+    kinematics: Kinematics
+    drives: tuple[Axis, ...]  # one a joint, the kinematics' own first; with its modes where joints are axes
+    columns: tuple[int, ...]  # of the pose, one for every axis of the program
+
+    @property
+    def cartesian(self) -> bool:
+        """Whether joints are axes."""
+        return self.kinematics.name == CARTESIAN.name
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the joints."""
+        return tuple(drive.name for drive in self.drives)
+
+    @property
+    def coupled(self) -> int:
+        """Joints that the kinematics moves the tool with; the others stand for themselves."""
+        return len(self.kinematics.joints)
+
+    def pose(self, axes: FloatArray) -> FloatArray:
+        """Positions or rates of the program's axes (n,d) as those of a pose (n,p)."""
+        if self.cartesian:
+            return axes
+        pose = np.zeros((axes.shape[0], len(self.drives)))
+        pose[:, self.columns] = axes
+        return frozen(pose)
+
+    def axes(self, pose: FloatArray) -> FloatArray:
+        """Positions of the program's axes (n,d) in a pose (n,p)."""
+        return pose if self.cartesian else frozen(pose[:, self.columns])
+
+    def inverse(self, pose: FloatArray) -> FloatArray:
+        """Joints at poses, (n,j); nan where out of reach."""
+        if self.cartesian:
+            return pose
+        own = self.coupled
+        return frozen(np.hstack([self.kinematics.inverse(frozen(pose[:, :own])), pose[:, own:]]))
+
+    def inverse_jacobian(self, pose: FloatArray) -> FloatArray:
+        """Joint rates per axis rates of the kinematics' own, (n,c,c)."""
+        return frozen(self.kinematics.inverse_jacobian(frozen(pose[:, : self.coupled])))
+
+    def rates(self, pose: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Joint rates (n,j) at poses and their velocities (n,p)."""
+        if self.cartesian:
+            return velocity
+        own = self.coupled
+        rates = np.einsum("nja,na->nj", self.inverse_jacobian(pose), velocity[:, :own])
+        return frozen(np.hstack([rates, velocity[:, own:]]))
+
+    def forward(self, joint: FloatArray, near: FloatArray) -> FloatArray:
+        """Poses (n,p) of joints (n,j), each near a pose."""
+        if self.cartesian:
+            return joint
+        own = self.coupled
+        pose = self.kinematics.forward(frozen(joint[:, :own]), frozen(near[:, :own]))
+        return frozen(np.hstack([pose, joint[:, own:]]))
+
+    def velocity(self, pose: FloatArray, rates: FloatArray) -> FloatArray:
+        """Velocities of poses (n,p) whose joints move at `rates` (n,j)."""
+        if self.cartesian:
+            return rates
+        own = self.coupled
+        moving = np.linalg.solve(self.inverse_jacobian(pose), rates[:, :own, None])[:, :, 0]
+        return frozen(np.hstack([moving, rates[:, own:]]))
+
+
+def joints_of(machine: Machine, kinematics: Kinematics = CARTESIAN) -> Joints:
+    """Joints of a machine whose axes are those of the program, in its order.
+
+    Joints without a drive are ideal.
+    """
+    names = tuple(axis.name for axis in machine.axes)
+    if kinematics.name == CARTESIAN.name:
+        return Joints(kinematics, machine.axes, tuple(range(len(names))))
+    given = machine.joints or (IdealDrive(),) * len(kinematics.joints)
+    own = [Axis(n, LINEAR_DEFAULT, d) for n, d in zip(kinematics.joints, given, strict=True)]
+    others = [axis for axis in machine.axes if axis.name not in kinematics.axes]
+    pose = (*kinematics.axes, *(axis.name for axis in others))
+    alone = [Axis(axis.name, axis.limits, axis.drive) for axis in others]
+    return Joints(kinematics, (*own, *alone), tuple(pose.index(name) for name in names))
