@@ -594,3 +594,131 @@ def knots(points, directions, slack, rest):
         if begin > first:
             found.append(begin)
     return np.array([*found, len(points) - 1])
+
+
+# --- kinematics -----------------------------------------------------------------------------------
+
+
+def turned(pose):
+    """Orientation of a pose: turns about the fixed axes x, y, z in that order."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_euler("xyz", pose[3:]).as_matrix()
+
+
+def leg_joints(pose, legs):
+    """Joints of six legs: the foot slides up to where the leg just spans to the platform, by bisection."""
+    from scipy.optimize import brentq
+
+    joints = []
+    for d, origin, point, length in zip(legs.direction, legs.origin, legs.point, legs.length, strict=True):
+        span = pose[:3] + turned(pose) @ point - origin
+        if not d.any():
+            joints.append(np.linalg.norm(span))
+            continue
+
+        def excess(q, span=span, d=d, length=length):
+            return np.linalg.norm(span - q * d) - length
+
+        nearest = span @ d  # the rail passes the leg's end here
+        joints.append(
+            brentq(excess, nearest - 2 * length, nearest, xtol=1e-13) if excess(nearest) < 0 else np.nan
+        )
+    return np.array(joints)
+
+
+def pose_of(joints, near, inverse):
+    """Pose whose joints these are, by MINPACK's hybrid method."""
+    from scipy.optimize import fsolve
+
+    return fsolve(lambda pose: inverse(pose) - joints, near, xtol=1e-13)
+
+
+def rates(function, axes, step=1e-3):
+    """Derivative of one row's values by each axis: central differences of fourth order."""
+    columns = []
+    for unit in step * np.eye(len(axes)):
+        near = function(axes + unit) - function(axes - unit)
+        far = function(axes + 2 * unit) - function(axes - 2 * unit)
+        columns.append((8 * near - far) / (12 * step))
+    return np.stack(columns, axis=1)
+
+
+def leg_twists(legs, position, rotation):
+    """Twist per joint rates: all six chains at once as one linear system in twist and passive rates."""
+    result = []
+    for active in range(6):
+        matrix, right = np.zeros((36, 36)), np.zeros(36)
+        for i in range(6):
+            d, end = legs.direction[i], position + rotation @ legs.point[i]
+            s = end - legs.origin[i]
+            along = s @ d
+            s = s - d * (along - np.sqrt(legs.length[i] ** 2 - s @ s + along**2))
+            u = np.cross(d, [0.3, 0.5, 0.8])
+            row = slice(6 * i, 6 * i + 6)
+            matrix[row, :6] = np.eye(6)
+            for k, (axis, r) in enumerate(
+                [(u, end - s), (np.cross(u, s), end - s), *((e, end) for e in np.eye(3))]
+            ):
+                axis = axis / np.linalg.norm(axis)
+                screw = [*np.cross(axis, position - r), *axis]  # omega x (tool - r)
+                matrix[row, 6 + 5 * i + k] = -np.array(screw)
+            if i == active:
+                right[6 * i : 6 * i + 3] = d
+        result.append(np.linalg.lstsq(matrix, right, rcond=None)[0][:6])
+    return np.stack(result, axis=1)
+
+
+def trilateration(centres, radius):
+    """Lower point at one distance from three centres (3,3), as surveyors do it: in the centres' own plane."""
+    first = centres[1] - centres[0]
+    d = np.linalg.norm(first)
+    ex = first / d
+    second = centres[2] - centres[0]
+    i = ex @ second
+    ey = second - i * ex
+    j = np.linalg.norm(ey)
+    ey = ey / j
+    x = d / 2
+    y = (i * i + j * j) / (2 * j) - i / j * x
+    up = np.cross(ex, ey)
+    return centres[0] + x * ex + y * ey - np.sqrt(radius**2 - x * x - y * y) * up * np.sign(up[2])
+
+
+def tilted(vector, a, c, pivot):
+    """A point of the workpiece in the machine: exponentials of the turns about z, then x, at the pivot."""
+    from scipy.linalg import expm
+
+    about_x = expm(a * np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0]]))
+    about_z = expm(c * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]]))
+    return about_x @ about_z @ (vector - pivot) + pivot
+
+
+# --- stability ------------------------------------------------------------------------------------
+
+
+def coupled_tick(drives, control, inverse_jacobian, tangent, state):
+    """One tick of the loop around a standing command, contour control section 3, written term by term.
+
+    state: (q, v, integral, error before, commands on their way); all drives lag.
+    """
+    q, v, integral, before, late = state
+    coupling, period = control.cross_coupling, control.sample_time
+    across = np.eye(3) - np.outer(tangent, tangent)
+    phi = -q
+    e = np.linalg.solve(inverse_jacobian, phi)
+    eps = across @ e[:3]
+    w = coupling.proportional * eps + coupling.integral * integral
+    w = w + coupling.derivative * (eps - before) / period
+    told = control.position_gain * phi
+    told = told + inverse_jacobian @ np.concatenate([w, coupling.orientation * e[3:]])
+    integral = across @ (integral + period * eps)
+    late = [*late, told]
+    heard, late = late[0], late[1:]
+    moved, sped = np.empty_like(q), np.empty_like(v)
+    for i, drive in enumerate(drives):
+        al = np.exp(-period / drive.time_constant)
+        be = drive.time_constant * (1.0 - al)
+        moved[i] = q[i] + be * v[i] + drive.gain * (period - be) * heard[i]
+        sped[i] = al * v[i] + (1.0 - al) * drive.gain * heard[i]
+    return moved, sped, integral, eps, late

@@ -138,7 +138,7 @@ def test_a_pose_out_of_reach_is_told_with_its_line():
     command = Trajectory(
         ("x", "y", "z"), T, frozen(place), frozen(position), frozen(velocity), frozen(0 * velocity)
     )
-    with pytest.raises(InfeasibleError, match="reach|singular") as refused:
+    with pytest.raises(InfeasibleError, match=r"reach|singular") as refused:
         simulate(command, machine(PLANTS), Control(T, 20.0), CUBIC, path)
     assert refused.value.line is not None
     assert path.line[0] < refused.value.line < path.line[-1]

@@ -190,6 +190,19 @@ def _show(result: dict[str, Any], *, quiet: bool) -> None:
             print_error(f"{result['file']}:{warning['line']}: warning: {warning['message']}")
 
 
+def _loop(loop: dict[str, float | None]) -> str:
+    """Say the margins of a loop in one line."""
+    if loop["max_sensitivity"] is None:
+        return "none"
+    told = {
+        "gain margin {:.3g}": loop["gain_margin"],
+        "phase margin {:.3g}°": loop["phase_margin_deg"],
+        "Ms {:.3g}": loop["max_sensitivity"],
+        "cross-coupling stable below {:.4g} 1/s": loop["largest_stable_cross_coupling_per_s"],
+    }
+    return ", ".join(text.format(number) for text, number in told.items() if number is not None)
+
+
 def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
     if result["dialect"] == "machine":
         modes = ", ".join(f"{axis.upper()} {count}" for axis, count in result["modes"].items())
@@ -204,6 +217,7 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
             ("joints", joints),
             ("modes", modes or "none"),
             ("shapers", shapers or "none"),
+            ("loop", _loop(result["loop"])),
         ]
     because = f" ({result['dialect_evidence']})" if result["dialect_evidence"] else ""
     moves = ", ".join(f"{count} {name}" for name, count in result["moves"].items() if count) or "none"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from cnc_shape.config.complaints import locate
+from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.machine_file import read_content, read_machine
 from cnc_shape.config.yaml_tree import refuse
-from cnc_shape.controllers.stability import check_stability
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import joints_of
 from cnc_shape.machine import FirstOrderLag, IdealDrive
@@ -29,7 +29,7 @@ def check_machine(path: Path | str) -> dict[str, object]:
     setup, notes, tree = read_machine(data, source)
     joints = joints_of(setup.machine, setup.kinematics)
     try:
-        check_stability(joints.drives, setup.control)
+        loop = check_loop(setup)
     except InfeasibleError as error:
         refuse(source, locate(tree, ("control",))[0], f"control: {error.reason}", error.hint)
     return {
@@ -45,6 +45,7 @@ def check_machine(path: Path | str) -> dict[str, object]:
             for name, shaper in setup.shapers.items()
         },
         "sample_time_s": setup.control.sample_time,
+        "loop": loop,
         "tools": len(setup.tools),
         "warnings": [{"line": note.line, "message": note.message} for note in notes],
     }

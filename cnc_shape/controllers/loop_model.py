@@ -1,0 +1,228 @@
+"""The closed loop near a pose, linearised: what its stability and its margins are read from.
+
+One tick of the servo loop (`controllers.loop`) is linear in the joint errors once pose and tangent are held:
+
+    e = J phi,  eps = (1 - t t') e,  w = Kc eps + Ki I + Kd (eps - eps_before) / T
+    u = Kp phi + J^-1 (w; Ko e_w),  I+ = (1 - t t') (I + T eps)
+
+with joint errors phi, e_w the rotary part of e, and J^-1 the inverse Jacobian. The integral that acts is the
+one before this tick's error is added.
+
+Three parts of the loop are no loop, and are left out: joints of ideal drives, which have no error; what of
+the integral lies along the path; and what of it lies where no drive of this machine can make an error. Each
+would leave a pole at z = 1 that nothing ever moves.
+
+Whatever the estimator, next to a straight path its contour error is the tangent's; what the path's curvature
+adds is left out, as is that pose and tangent change.
+
+Of the scalar form, which is not linear, the proportional part is taken: it acts as that of the vector form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cnc_shape.arrays import FloatArray
+from cnc_shape.controllers.control import Control
+from cnc_shape.controllers.cross_coupling import CrossCoupling, Form
+from cnc_shape.limits import Limits
+from cnc_shape.machine import Axis, Drive, FirstOrderLag
+from cnc_shape.plant import discretise
+
+NO_REACH = 1e-9  # -, share of the largest contour error below which the drives cannot make one that way
+UNBOUNDED = Limits(np.inf, np.inf)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LoopModel:
+    """The loop of j lag drives at n pairs of pose and tangent."""
+
+    sample_time: float  # s
+    delay_samples: int
+    coupling: CrossCoupling  # in vector form
+    gains: FloatArray  # (j,) 1/s, of the position loops
+    drives: FloatArray  # (j,2,2) transition of position and velocity
+    held: FloatArray  # (j,2) answer to a command held over the sample
+    across: FloatArray  # (n,3,j) contour error per joint error
+    back: FloatArray  # (n,j,3) joint velocity per Cartesian velocity
+    turn: FloatArray  # (n,j,j) joint velocity of the orientation term per joint error
+    reach: FloatArray  # (n,3,3) projection onto the contour errors that the drives can make
+
+    def __len__(self) -> int:
+        return len(self.across)
+
+
+def loop_model(
+    drives: Sequence[Drive], control: Control, inverse_jacobians: FloatArray, tangents: FloatArray
+) -> LoopModel:
+    """Linearise a loop at pairs of pose and tangent.
+
+    Parameters
+    ----------
+    drives
+        Those of all joints. Joints beyond the columns of the Jacobians are axes by themselves.
+    control
+        The loop.
+    inverse_jacobians
+        Joint rates per axis rates at every pose, (n,c,c), invertible; x, y and z first.
+    tangents
+        Unit vectors along the path, (n,3).
+    """
+    rows, size = inverse_jacobians.shape[:2]
+    linear, joints = min(3, size), len(drives)
+    forward = np.linalg.inv(inverse_jacobians)
+    made, back = np.zeros((rows, 3, joints)), np.zeros((rows, joints, 3))
+    made[:, :linear, :size] = forward[:, :linear]
+    back[:, :size, :linear] = inverse_jacobians[:, :, :linear]
+    coupling = _in_vector_form(control.cross_coupling)
+    turn = np.zeros((rows, joints, joints))
+    turn[:, :size, :size] = coupling.orientation * inverse_jacobians[:, :, linear:] @ forward[:, linear:]
+    lagging = np.array([isinstance(drive, FirstOrderLag) for drive in drives], dtype=bool)
+    across = (made - tangents[:, :, None] * (tangents[:, None, :] @ made))[:, :, lagging]
+    gains = np.array(control.joint_gains or [control.position_gain] * joints, dtype=np.float64)
+    axes = [Axis("", UNBOUNDED, drive) for drive in drives if isinstance(drive, FirstOrderLag)]
+    plant = discretise(axes, control.sample_time) if axes else None
+    return LoopModel(
+        control.sample_time,
+        control.delay_samples,
+        coupling,
+        gains[lagging],
+        np.zeros((0, 2, 2)) if plant is None else plant.transition,
+        np.zeros((0, 2)) if plant is None else plant.held,
+        across,
+        back[:, lagging],
+        turn[:, lagging][:, :, lagging],
+        _reach(across),
+    )
+
+
+def open_loop(model: LoopModel) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """State space from the drives' input to the command that comes back: ``x+ = A x + B u, u = C x``.
+
+    States: positions and velocities of the drives (j each); where the controller has them, the integral (3)
+    and the contour error before (3); the commands on their way, oldest first (j each).
+    Returns A (n,s,s), B (s,j) and C (n,j,s).
+    """
+    rows, joints, late = len(model), model.gains.size, model.delay_samples
+    coupling, period = model.coupling, model.sample_time
+    remembered = 3 * (coupling.integral != 0.0) + 3 * (coupling.derivative != 0.0)
+    size = 2 * joints + remembered + late * joints
+    A, B, told = np.zeros((rows, size, size)), np.zeros((size, joints)), np.zeros((rows, joints, size))
+    j = np.arange(joints)
+    for row in range(2):
+        B[row * joints + j, j] = model.held[:, row]
+        for column in range(2):
+            A[:, row * joints + j, column * joints + j] = model.drives[:, row, column]
+    differential = coupling.derivative / period
+    told[:, :, :joints] = -model.turn - (coupling.proportional + differential) * model.back @ model.across
+    told[:, j, j] -= model.gains
+    place = 2 * joints
+    if coupling.integral != 0.0:
+        integral = slice(place, place + 3)
+        told[:, :, integral] = coupling.integral * model.back
+        A[:, integral, integral] = model.reach
+        A[:, integral, :joints] = -period * model.across
+        place += 3
+    if coupling.derivative != 0.0:
+        before = slice(place, place + 3)
+        told[:, :, before] = -differential * model.back
+        A[:, before, :joints] = -model.across
+        place += 3
+    if not late:
+        return A, B, told
+    A[:, size - joints :] = told
+    A[:, place + np.arange((late - 1) * joints), place + joints + np.arange((late - 1) * joints)] = 1.0
+    heard = np.zeros((rows, joints, size))
+    heard[:, j, place + j] = 1.0
+    return A, B, heard
+
+
+def loop_transfer(model: LoopModel, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Loop transfer matrices L(z) at the drives' inputs, (n,f,j,j): ``u = -L u`` closes the loop.
+
+    z (f,), off the poles of the loop.
+    """
+    coupling, period = model.coupling, model.sample_time
+    controller = (
+        coupling.proportional
+        + coupling.integral * period / (z - 1.0)
+        + coupling.derivative * (1.0 - 1.0 / z) / period
+    )
+    # position per command of a drive, whose transition is [[1, be], [0, al]]
+    moving = model.held[:, 1] / (z[:, None] - model.drives[:, 1, 1])
+    drive = (model.held[:, 0] + model.drives[:, 0, 1] * moving) / (z[:, None] - 1.0)
+    answer = (model.back @ model.across)[:, None] * controller[:, None, None]
+    answer = answer + (np.diag(model.gains) + model.turn)[:, None]
+    return answer * (drive / z[:, None] ** model.delay_samples)[:, None, :]
+
+
+def closed_loop(model: LoopModel) -> FloatArray:
+    """Transition of the closed loop from tick to tick, (n,s,s)."""
+    A, B, C = open_loop(model)
+    return A + B @ C
+
+
+def loop_matrix(
+    drives: Sequence[Drive], control: Control, inverse_jacobian: FloatArray, tangent: FloatArray
+) -> FloatArray:
+    """Transition of the closed loop at a pose and a tangent, (s,s); arguments as `loop_model`, one row."""
+    return closed_loop(loop_model(drives, control, inverse_jacobian[None], tangent[None]))[0]
+
+
+def poles(
+    drives: Sequence[Drive], control: Control, inverse_jacobian: FloatArray, tangent: FloatArray
+) -> NDArray[np.complex128]:
+    """Poles in z of the closed loop at a pose and a tangent, (s,); arguments as `loop_model`, one row."""
+    found = np.linalg.eigvals(loop_matrix(drives, control, inverse_jacobian, tangent))
+    return found.astype(np.complex128)
+
+
+def pole_radius(model: LoopModel) -> FloatArray:
+    """Largest |z| of the poles, (n,); 0 without a loop."""
+    if not model.gains.size:
+        return np.zeros(len(model))
+    return np.abs(np.linalg.eigvals(closed_loop(model))).max(axis=1)
+
+
+def with_coupling(model: LoopModel, factor: float) -> LoopModel:
+    """Return the model with the gains of the controller across the path times `factor`, -."""
+    coupling = model.coupling
+    grown = replace(
+        coupling,
+        proportional=factor * coupling.proportional,
+        integral=factor * coupling.integral,
+        derivative=factor * coupling.derivative,
+    )
+    return replace(model, coupling=grown)
+
+
+def rows_of(model: LoopModel, rows: NDArray[np.intp]) -> LoopModel:
+    """Return the model at some of its pairs of pose and tangent."""
+    return replace(
+        model,
+        across=model.across[rows],
+        back=model.back[rows],
+        turn=model.turn[rows],
+        reach=model.reach[rows],
+    )
+
+
+def _in_vector_form(coupling: CrossCoupling | None) -> CrossCoupling:
+    if coupling is None:
+        return CrossCoupling(0.0)
+    if coupling.form is Form.SCALAR:
+        return replace(coupling, form=Form.VECTOR, integral=0.0, derivative=0.0)
+    return coupling
+
+
+def _reach(across: FloatArray) -> FloatArray:
+    """Projection onto the span of the columns of `across`, (n,3,3)."""
+    if not across.shape[2]:
+        return np.zeros((len(across), 3, 3))
+    left, size, _ = np.linalg.svd(across, full_matrices=False)
+    left = left * (size > NO_REACH * size[:, :1])[:, None, :]
+    return left @ left.transpose(0, 2, 1)
