@@ -249,23 +249,6 @@ def test_an_empty_last_chunk_changes_nothing():
     assert_array_equal(np.concatenate([first.tool, rest.tool]), whole.tool)
 
 
-@pytest.mark.parametrize(("sample_time", "limit"), [(1e-3, 2027.0), (2e-3, 1026.0)])  # plant 2 of paper 004
-def test_an_unstable_loop_is_told_with_its_largest_gain(sample_time, limit):
-    stage = machine(0.0142, 0.9982)
-    simulating(stage, Control(sample_time, 0.99 * limit))
-    with pytest.raises(InfeasibleError, match="stable below") as refused:
-        simulating(stage, Control(sample_time, 1.01 * limit))
-    told = float(str(refused.value).split("stable below ")[1].split()[0])
-    assert_allclose(told, limit, rtol=2e-3)
-
-
-def test_delay_lowers_the_stable_gain():  # 660.7 1/s across at Kp 20 with one sample of delay, paper 004
-    stage = machine(0.0142, 0.9982)
-    simulating(stage, Control(T, 20.0, 1, None, CrossCoupling(640.0)))
-    with pytest.raises(InfeasibleError, match="across the path"):
-        simulating(stage, Control(T, 20.0, 1, None, CrossCoupling(960.0)))
-
-
 def test_a_command_of_another_period_is_a_wrong_call():
     with pytest.raises(ValueError, match="sample_time"):
         simulate(point_to_point(2e-3), machine(), Control(T))

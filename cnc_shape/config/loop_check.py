@@ -15,38 +15,41 @@ from cnc_shape.controllers.stability import (
     check_stability,
     largest_stable_coupling,
 )
-from cnc_shape.machine import FirstOrderLag, IdealDrive
+from cnc_shape.joints import joints_of
+from cnc_shape.machine import FirstOrderLag
 from cnc_shape.units import DEGREE
+
+SINGULAR = 1e12  # -, condition of the Jacobian beyond which home is no pose to judge a loop at
 
 
 def check_loop(setup: Setup) -> dict[str, float | None]:
     """Refuse an unstable loop; return its margins at home, ready for JSON.
 
-    Home is where all axes stand at 0. Null where there is no end: no drive that lags, or no such pose.
+    Home is where all axes stand at 0. Null where there is no end, as without any drive that
+    lags, or where the machine cannot stand there. The largest cross-coupling is that of the file's ratios of
+    integral and derivative to proportional gain, or of a proportional one.
 
     Raises
     ------
     InfeasibleError
         As `check_stability`.
     """
-    machine, control, kinematics = setup.machine, setup.control, setup.kinematics
-    if kinematics.name == "cartesian":
-        check_stability(machine.axes, control)
-        axes, control = cartesian_loop(machine.axes, control)
-        drives = tuple(axis.drive for axis in axes)
-        inverse_jacobian = np.eye(len(drives))
+    joints, control = joints_of(setup.machine, setup.kinematics), setup.control
+    if joints.cartesian:
+        check_stability(joints.drives, control)  # names the axes
+        axes, control = cartesian_loop(joints.drives, control)
+        home = np.eye(len(axes))[None]
     else:
-        others = [axis.drive for axis in machine.axes if axis.name not in kinematics.axes]
-        drives = (*(machine.joints or (IdealDrive(),) * len(kinematics.joints)), *others)
-        inverse_jacobian = kinematics.inverse_jacobian(np.zeros((1, len(kinematics.axes))))[0]
-        reachable = bool(np.isfinite(inverse_jacobian).all())
-        check_poses(drives, control, inverse_jacobian[None] if reachable else np.zeros((0, 1, 1)))
-        if not reachable:
-            drives = ()
-    if not any(isinstance(drive, FirstOrderLag) for drive in drives):
+        axes = joints.drives
+        home = joints.inverse_jacobian(np.zeros((1, len(axes))))
+        home = home[np.isfinite(home).all(axis=(1, 2))]
+        home = home[np.linalg.cond(home) < SINGULAR]
+        check_poses([axis.drive for axis in axes], control, home)
+    drives = [axis.drive for axis in axes]
+    if not len(home) or not any(isinstance(drive, FirstOrderLag) for drive in drives):
         return _summary(np.inf, np.inf, np.inf, np.inf)
-    margins = worst_margins(drives, control, inverse_jacobian, DIRECTIONS)
-    largest = largest_stable_coupling(drives, control, inverse_jacobian[None])
+    margins = worst_margins(drives, control, home[0], DIRECTIONS)
+    largest = largest_stable_coupling(drives, control, home)
     return _summary(margins.gain, margins.phase / DEGREE, margins.sensitivity, largest)
 
 

@@ -12,6 +12,9 @@ Three parts of the loop are no loop, and are left out: joints of ideal drives, w
 the integral lies along the path; and what of it lies where no drive of this machine can make an error. Each
 would leave a pole at z = 1 that nothing ever moves.
 
+Whatever the estimator, next to a straight path its contour error is the tangent's; what the path's curvature
+adds is left out, as is that pose and tangent change.
+
 Of the scalar form, which is not linear, the proportional part is taken: it acts as that of the vector form.
 """
 

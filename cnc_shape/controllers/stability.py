@@ -155,7 +155,8 @@ def _check(
     coupling = control.cross_coupling
     if coupling is None or not len(tangents):
         return
-    if _alike(drives, gains):  # then pose and direction make no difference
+    alike = _alike(drives, gains)
+    if alike:
         inverse_jacobians, tangents = inverse_jacobians[:1], tangents[:1]
     model = loop_model(drives, control, inverse_jacobians, tangents)
     radius = pole_radius(model)
@@ -170,7 +171,7 @@ def _check(
         )
     largest = coupling.proportional * _largest_coupling(model)
     worst = int(radius.argmax())
-    where = f"{_told(place(worst))}, moving along {_direction(tangents[worst])}"
+    where = "" if alike else f"{_told(place(worst))}, moving along {_direction(tangents[worst])}"
     share = (
         " with its integral and derivative" if model.coupling.integral or model.coupling.derivative else ""
     )
