@@ -17,6 +17,8 @@ from scipy.signal import lfilter
 
 from cnc_shape.controllers import Control
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.experiments.contour_control.better import margins_of
+from cnc_shape.experiments.contour_control.comparisons import estimated, integral_table
 from cnc_shape.experiments.contour_control.contours import contours
 from cnc_shape.experiments.contour_control.laws import (
     COMMON,
@@ -41,6 +43,7 @@ from cnc_shape.experiments.contour_control.rigs import (
     run,
 )
 from cnc_shape.experiments.contour_control.time_law import TimeLaw
+from cnc_shape.units import MICROMETRE
 
 RIGS = {"cartesian": CARTESIAN, "cubic": CUBIC}
 PRINTED = np.array([0.005, 0.05])  # µm, half the last digit of RMS and largest error
@@ -160,6 +163,24 @@ def test_a_wrong_model_of_the_drives(scale, alone, by_foot, by_tangent):
     assert_allclose(ours, [alone, by_foot, by_tangent], rtol=0.03, atol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("control", "off"),
+    [
+        (INDEPENDENT, {"tangent": 37.5, "circle of curvature": 6.6, "foot point": 0.93}),
+        (replace(INDEPENDENT, position_gain=30.0),
+         {"tangent": 16.9, "circle of curvature": 2.0, "foot point": 0.40}),
+        (fed(COMMON), {"tangent": 0.17, "foot point": 0.0}),
+    ],
+    ids=["Kp 20", "Kp 30", "feedforward"],
+)  # fmt: skip
+def test_estimators_on_one_motion(control, off):
+    true, estimates = estimated(control)
+    size = np.linalg.norm(true, axis=1)
+    for name, expected in off.items():
+        away = (np.linalg.norm(estimates[name], axis=1) - size) / MICROMETRE
+        assert np.sqrt((away**2).mean()) == pytest.approx(expected, rel=0.03, abs=0.1)
+
+
 # --- what has to hold whatever the numbers
 
 
@@ -180,6 +201,14 @@ def test_the_same_gains_do_better(trial, rig):
     assert ours[1] < theirs[1]
 
 
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
+def test_the_same_gains_have_the_same_margins(rig):
+    ours, theirs = margins_of(rig, SAME_LOOP), margins_of(rig, PAPER)
+    assert ours == theirs
+    assert theirs.gain > 60.0
+    assert margins_of(rig, foot(80.0)).gain < 0.4 * theirs.gain
+
+
 def test_independent_axes_are_a_linear_filter():
     """The z-domain closed loop ``Kp N / (D + Kp N)`` of every axis, to 1e-10 mm."""
     result = run(CARTESIAN, "fan", INDEPENDENT)
@@ -198,6 +227,11 @@ def test_independent_axes_are_a_linear_filter():
 
 def test_contours_are_what_trials_run():
     assert {contour for contour, _ in TRIALS.values()} == set(contours())
+
+
+def test_an_integrated_length_never_comes_to_rest():
+    """At 400 1/s^2 the loop chatters, at 2000 1/s^2 it diverges; the integral of the vector leaves nothing."""
+    assert [row.ours for row in integral_table().rows] == [0.0, 1.0, 0.0, 1.0]
 
 
 # --- samples
