@@ -65,6 +65,14 @@ def deviation(found: Tally) -> Deviation:
 
 
 @dataclass(frozen=True, slots=True)
+class Turn:
+    """Angle between the tool's direction against the workpiece and the commanded one, over all samples."""
+
+    rms: float  # rad
+    max: float  # rad
+
+
+@dataclass(frozen=True, slots=True)
 class CaseSummary:
     """The scalars of one case: one row of the table."""
 
@@ -75,6 +83,7 @@ class CaseSummary:
     tool: Deviation  # of drive plus structure
     following_rms: Mapping[str, float]  # joint: mm or rad
     residual_vibration: Mapping[str, float]  # axis: mm or rad
+    turn: Turn | None = None  # where the machine turns tool or workpiece
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +145,8 @@ class Trial:
         self._measured: MeasuringState | None = None
         self._tallies = [Tally(), Tally(), Tally()]  # of the command, the drives, the tool
         self._following = np.zeros(len(joints.names))
-        self._turn, self._turned = Tally(), False  # of the tool's direction
+        self._turn, self._furthest = np.zeros(1), 0.0  # rad^2, rad: of the tool's direction
+        self._turns = kinematics.turn is not None
         self._samples = 0
         self._cycle_time = 0.0
 
@@ -150,6 +160,8 @@ class Trial:
         self._simulated, response = self._simulate(self._simulated, block.toolpath, command, block.last)
         add_squares(response.following_error, self._following)
         self._samples += len(response.command)
+        add_squares(response.turn[:, None], self._turn)
+        self._furthest = max(self._furthest, float(response.turn.max(initial=0.0)))
         signals = (response.command.position, response.position, response.tool)
         self._measured, errors = self._measure(
             self._measured, block.toolpath, response.command.arc_length, signals, block.last
@@ -177,7 +189,8 @@ class Trial:
             for axis, total in zip(self._joints, self._following.tolist(), strict=True)
         }
         residual = dict(zip(axes, self._simulated.residual.tolist(), strict=True))
-        return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual)
+        turn = Turn(sqrt(float(self._turn[0]) / self._samples), self._furthest) if self._turns else None
+        return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual, turn)
 
 
 def run(

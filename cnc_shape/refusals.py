@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.controllers import Control
 from cnc_shape.controllers.loop import FURTHEST
+from cnc_shape.controllers.stability import check_along, check_poses, check_stability
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import Joints
 from cnc_shape.kinematics import first_refusal
@@ -13,6 +17,82 @@ from cnc_shape.program import ROTARY
 from cnc_shape.servo import Ticks
 from cnc_shape.units import DEGREE
 from cnc_shape.windows import Windows
+
+LOOKS_EVERY = 1024  # samples from one look at the loop's stability on the way to the next
+
+
+def check_own_loops(joints: Joints, control: Control) -> None:
+    """Refuse a loop that is unstable wherever the machine stands.
+
+    Where joints are axes that is the whole loop; elsewhere every joint's own, as the cross-coupling depends
+    on the pose.
+
+    Raises
+    ------
+    InfeasibleError
+        Names what is unstable, its gain and the largest stable one.
+    """
+    alone = control if joints.cartesian else replace(control, cross_coupling=None)
+    check_stability(joints.drives, alone)
+
+
+def check_on_the_way(
+    joints: Joints, control: Control, pose: FloatArray, velocity: FloatArray, ticks: int, source: str
+) -> None:
+    """Refuse a cross-coupled loop that is unstable at a pose of the way, before it is simulated there.
+
+    Parameters
+    ----------
+    joints, control
+        The machine and its loop.
+    pose
+        (n,p) mm or rad, commanded from tick `ticks` on; one of `LOOKS_EVERY` is looked at.
+    velocity
+        (n,d) mm/s, of x, y and z first. At rest every direction is looked at.
+    ticks
+        Number of the first of them.
+    source
+        Name of the program.
+
+    Raises
+    ------
+    InfeasibleError
+        Names pose, direction, the gain and the largest stable one.
+    """
+    own = joints.coupled
+    looked = pose[-ticks % LOOKS_EVERY :: LOOKS_EVERY]
+    if not len(looked):
+        return
+    toward = velocity[-ticks % LOOKS_EVERY :: LOOKS_EVERY, :3]
+    speed = np.sqrt((toward * toward).sum(axis=1))
+    drives = [drive.drive for drive in joints.drives[:own]]
+    mine = replace(control, joint_gains=control.joint_gains[:own])
+    inverse = joints.inverse_jacobian(frozen(looked))
+    moving = speed > 0.0
+    try:
+        if not moving.all():
+            still = int(np.argmin(moving))
+            check_poses(
+                drives, mine, inverse[still : still + 1], place=lambda _: _place(joints, looked[still])
+            )
+        if moving.any():
+            there = looked[moving]
+            check_along(
+                drives, mine, inverse[moving], toward[moving] / speed[moving, None],
+                lambda row: _place(joints, there[row]),
+            )  # fmt: skip
+    except InfeasibleError as error:
+        error.source = error.source or source or None
+        raise
+
+
+def _place(joints: Joints, pose: FloatArray) -> str:
+    """Say where a pose is."""
+    at: list[str] = []
+    for axis, value in zip(joints.kinematics.axes, pose.tolist(), strict=False):
+        rotary = axis in ROTARY
+        at.append(f"{axis.upper()} {value / DEGREE if rotary else value:.6g}{'°' if rotary else ''}")
+    return f"at {', '.join(at)}"
 
 
 def refuse_pose(
@@ -42,17 +122,13 @@ def refuse_pose(
     if refused is None:
         return
     row, reason = refused
-    at: list[str] = []
-    for axis, value in zip(joints.kinematics.axes, pose[row].tolist(), strict=False):
-        rotary = axis in ROTARY
-        at.append(f"{axis.upper()} {value / DEGREE if rotary else value:.6g}{'°' if rotary else ''}")
     line = None
     if windows.path.low.size:
         place = arc_length[min(row, arc_length.size - 1)]
         found = min(int(np.searchsorted(windows.path.high, place)), windows.path.line.size - 1)
         line = int(windows.path.line[found])
     raise InfeasibleError(
-        f"{reason} at {', '.join(at)}",
+        f"{reason} {_place(joints, pose[row])}",
         hint="move the part, or check the machine's geometry under kinematics",
         source=source or None,
         line=line,
@@ -92,7 +168,7 @@ def refuse_divergence(
     elif ran.done < ran.joint.shape[0]:
         row = ran.done
         following = np.abs(reference[row] - ran.joint[row])
-        joint = int(np.argmin(following <= FURTHEST))
+        joint = int(np.flatnonzero(~(following <= FURTHEST))[0])
     else:
         return
     kind = "axis" if joints.cartesian else "joint"

@@ -19,11 +19,10 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers import Control, Estimator
 from cnc_shape.controllers.loop import Command, Memory, Poses
-from cnc_shape.controllers.stability import check_stability
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine
-from cnc_shape.refusals import refuse_divergence, refuse_pose
+from cnc_shape.refusals import check_on_the_way, check_own_loops, refuse_divergence, refuse_pose
 from cnc_shape.segments import path_table
 from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
 from cnc_shape.toolpath import Toolpath
@@ -113,7 +112,7 @@ def simulating(
         its line; a signal that leaves all bounds.
     """
     joints = joints_of(machine, kinematics)
-    check_stability(joints.drives, control)
+    check_own_loops(joints, control)
     return _Stage(
         machine,
         control,
@@ -184,12 +183,15 @@ class _Stage:
         if windows is not None:
             refuse_pose(self._joints, pose, command.arc_length, windows, source)
         poses, inverse = self._poses(now, pose, ticks)
+        if self._coupled:
+            check_on_the_way(self._joints, self._control, pose, told.velocity, now.ticks, source)
         ran = self._loop.run(now.loop, told, poses, self._path(windows))
-        refuse_divergence(self._joints, told.reference, ran, now.ticks * self._period, self._period, source)
+        before = now.ticks * self._period
+        refuse_divergence(self._joints, told.reference, ran, before, self._period, source)
         position, tool, turn = self._axes(now, pose, ran)
         response = Response(
-            command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool, ran.drive,
-            turn,
+            command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
+            ran.drive, turn,
         )  # fmt: skip
         settling = now.settling
         if last:

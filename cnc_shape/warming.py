@@ -23,6 +23,7 @@ from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Setup
 from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.kernels import compiled_count
+from cnc_shape.kinematics import cubic_parallel, cubic_rails, first_refusal, linear_delta, trunnion_ac
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import run
 from cnc_shape.readers import ReadingOptions, read_program, reading
@@ -86,6 +87,7 @@ def warm() -> Iterator[int]:
         _certify(Path(folder) / "lines.nc", machines[0])
         _thin(Path(folder) / "long.nc", machines[0])
         _stream(machines[0])
+        _hold()
         yield compiled_count()
 
 
@@ -126,6 +128,21 @@ def _stream(setup: Setup) -> None:
     sample_time = setup.control.sample_time
     wanted = filters(setup.acting_shapers, ("x", "y"), sample_time, Interpolation.LINEAR, {})
     LiveShaper(wanted).push(np.zeros(2))
+
+
+def _hold() -> None:
+    """Hold a pose with every kinematics that has kernels of its own."""
+    nowhere = np.zeros(3)
+    for machine in (
+        cubic_parallel(cubic_rails(1.0, 5.0, nowhere)),
+        linear_delta(1.0, 2.0),
+        trunnion_ac(nowhere),
+    ):
+        poses = np.zeros((2, len(machine.axes)))
+        first_refusal(machine, poses)
+        machine.forward(machine.inverse(poses), poses)
+        if machine.turn is not None:
+            machine.turn(poses, poses)
 
 
 def _certify(path: Path, setup: Setup) -> None:

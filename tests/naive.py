@@ -81,49 +81,136 @@ def contour_distance(point, toolpath, lower=-np.inf, upper=np.inf, count=2001, r
 # --- servo loop -----------------------------------------------------------------------------------
 
 
-def servo_loop(command, axes, loop):
-    """The loop with lag drives as matrices over lists: one expm a period and axis, terms as formulas."""
+def foot_on_lines(toolpath, point, lower, upper):
+    """Nearest point of straight lines to `point` (3,) mm between two places on the path, by trying all."""
+    best, foot = np.inf, None
+    total = toolpath.arc_length[-1]
+    lower, upper = min(max(lower, 0.0), total), max(min(upper, total), 0.0)
+    for row in range(len(toolpath)):
+        a, b = toolpath.start[row, :3], toolpath.end[row, :3]
+        low, high = toolpath.arc_length[row], toolpath.arc_length[row + 1]
+        if high <= low or high < lower or low > upper:
+            continue
+        first, last = max(lower - low, 0.0) / (high - low), min(upper - low, high - low) / (high - low)
+        share = np.clip((point - a) @ (b - a) / ((b - a) @ (b - a)), first, last)
+        at = a + share * (b - a)
+        if np.linalg.norm(point - at) < best:
+            best, foot = np.linalg.norm(point - at), at
+    return foot
+
+
+def joint_jacobian(kinematics, pose, step=1e-4):
+    """Joint rates per axis rates at a pose (d,), by central differences."""
+    columns = []
+    for i in range(pose.size):
+        ahead, behind = pose.copy(), pose.copy()
+        ahead[i] += step
+        behind[i] -= step
+        columns.append((kinematics.inverse(ahead[None]) - kinematics.inverse(behind[None]))[0] / (2 * step))
+    return np.column_stack(columns)
+
+
+def estimated(coupling, error, tangent, curvature, tool, toolpath, window):
+    """The contour error as a vector from the tool to the path, the way the loop guesses it."""
+    kind = coupling.estimator.name
+    if kind == "FOOT_POINT":
+        return foot_on_lines(toolpath, tool, *window) - tool
+    if kind == "CIRCLE" and np.linalg.norm(curvature) > 1e-6:
+        radius = 1 / np.linalg.norm(curvature)
+        normal = curvature * radius
+        arm = -error - radius * normal  # from the centre to the tool
+        flat = (arm @ tangent) * tangent + (arm @ normal) * normal
+        beside = error - (error @ tangent) * tangent - (error @ normal) * normal
+        return (radius / np.linalg.norm(flat) - 1) * flat + beside
+    return error - (error @ tangent) * tangent
+
+
+def servo_loop(command, axes, loop, kinematics=None, drives=None, toolpath=None, reach=None):
+    """The loop with lag drives as matrices over lists: one expm a period and axis, terms as formulas.
+
+    With a kinematics, joints move the axes and the tool is the drives' position.
+    """
     from scipy.linalg import expm
 
     T, n = loop.sample_time, len(command)
+    joints = [axis.drive for axis in axes] if kinematics is None else drives
+    modes = [axis.modes if kinematics is None else () for axis in axes] + [()] * len(joints)
     systems = []
-    for axis in axes:
-        tau, gain = axis.drive.time_constant, axis.drive.gain
-        size = 2 + 2 * len(axis.modes)
+    for drive, own in zip(joints, modes, strict=False):
+        size = 2 + 2 * len(own)
         M = np.zeros((size + 1, size + 1))
-        M[0, 1], M[1, 1], M[1, size] = 1, -1 / tau, gain / tau
-        for k, mode in enumerate(axis.modes):
+        M[0, 1], M[1, 1] = 1, -1 / drive.time_constant
+        M[1, size] = drive.gain / drive.time_constant
+        for k, mode in enumerate(own):
             w = 2 * np.pi * mode.natural_frequency
             M[2 + 2 * k, 3 + 2 * k] = 1
             M[3 + 2 * k, 2 + 2 * k], M[3 + 2 * k, 3 + 2 * k] = -w * w, -2 * mode.damping_ratio * w
             M[3 + 2 * k] -= mode.participation * M[1]
         systems.append(expm(M * T))
-    states = [np.zeros(2 + 2 * len(axis.modes)) for axis in axes]
-    for state, start in zip(states, command.position[0], strict=True):
+    if kinematics is None:
+        reference, rates = command.position, command.velocity
+        jacobians = [np.eye(len(joints))] * n
+    else:
+        pose, motion = (np.zeros((n, len(kinematics.axes))) for _ in range(2))
+        pose[:, : len(axes)], motion[:, : len(axes)] = command.position, command.velocity
+        reference = kinematics.inverse(pose)
+        every = [joint_jacobian(kinematics, at) for at in pose]
+        jacobians = [every[k - k % loop.jacobian_every] for k in range(n)]
+        rates = np.array([J @ v for J, v in zip(every, motion, strict=True)])
+    states = [np.zeros(2 + 2 * len(own)) for _, own in zip(joints, modes, strict=False)]
+    for state, start in zip(states, reference[0], strict=True):
         state[0] = start
-    queue = [np.zeros(len(axes)) for _ in range(loop.delay_samples)]
-    tangent, position, tool = np.zeros(3), [], []
+    queue = [np.zeros(len(joints)) for _ in range(loop.delay_samples)]
+    tangent, curvature, position, tool = np.zeros(3), np.zeros(3), [], []
+    integral, before, length_integral, length_before = np.zeros(3), None, 0.0, None
     for k in range(n):
         q = np.array([state[0] for state in states])
         position.append(q)
         tool.append([state[0] + state[2::2].sum() for state in states])
         after = min(k + 1, n - 1)
-        next_velocity = command.velocity[k + 1] if k + 1 < n else 0 * command.velocity[k]
-        error = command.position[k] - q
+        next_rate = rates[k + 1] if k + 1 < n else 0 * rates[k]
+        phi = reference[k] - q
         speed = np.linalg.norm(command.velocity[k, :3])
         if speed > 0:
             tangent = command.velocity[k, :3] / speed
-        u = loop.position_gain * error
+            bend = command.acceleration[k, :3]
+            curvature = (bend - (bend @ tangent) * tangent) / speed**2
+        u = (np.array(loop.joint_gains) if loop.joint_gains else loop.position_gain) * phi
         if loop.feedforward:
-            mean_v = (command.position[after] - command.position[k]) / T
-            mean_a = (next_velocity - command.velocity[k]) / T
-            for i, axis in enumerate(axes):
+            mean_v = (reference[after] - reference[k]) / T
+            mean_a = (next_rate - rates[k]) / T
+            for i, drive in enumerate(joints):
                 u[i] += (
                     loop.feedforward.velocity * mean_v[i]
-                    + loop.feedforward.acceleration * axis.drive.time_constant * mean_a[i]
-                ) / axis.drive.gain
-        if loop.cross_coupling:
-            u[:3] += loop.cross_coupling.proportional * (error[:3] - (error[:3] @ tangent) * tangent)
+                    + loop.feedforward.acceleration * drive.time_constant * mean_a[i]
+                ) / drive.gain
+        if coupling := loop.cross_coupling:
+            e = np.linalg.solve(jacobians[k], phi)
+            window = None
+            if reach:
+                s = command.arc_length
+                window = (
+                    s[max(k - reach.back, 0)] - reach.margin,
+                    s[min(k + reach.ahead, n - 1)] + reach.margin,
+                )
+            at = command.position[k, :3] - e[:3]
+            eps = estimated(coupling, e[:3], tangent, curvature, at, toolpath, window)
+            if coupling.form.name == "VECTOR":
+                change = 0 * eps if before is None else (eps - before) / T
+                w = coupling.proportional * eps + coupling.integral * integral + coupling.derivative * change
+                integral, before = integral + T * eps, eps
+                integral = integral - (integral @ tangent) * tangent
+            else:
+                size = np.linalg.norm(eps)
+                change = 0.0 if length_before is None else (size - length_before) / T
+                w = (
+                    coupling.proportional * size
+                    + coupling.integral * length_integral
+                    + coupling.derivative * change
+                )
+                w = w * eps / size if size > 0 else 0 * eps
+                length_integral, length_before = length_integral + T * size, size
+            u += jacobians[k] @ np.concatenate([w, coupling.orientation * e[3:]])
         queue.append(u)
         now = queue.pop(0)
         states = [(S @ np.append(x, w))[:-1] for S, x, w in zip(systems, states, now, strict=True)]
@@ -507,6 +594,104 @@ def knots(points, directions, slack, rest):
         if begin > first:
             found.append(begin)
     return np.array([*found, len(points) - 1])
+
+
+# --- kinematics -----------------------------------------------------------------------------------
+
+
+def turned(pose):
+    """Orientation of a pose: turns about the fixed axes x, y, z in that order."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_euler("xyz", pose[3:]).as_matrix()
+
+
+def leg_joints(pose, legs):
+    """Joints of six legs: the foot slides up to where the leg just spans to the platform, by bisection."""
+    from scipy.optimize import brentq
+
+    joints = []
+    for d, origin, point, length in zip(legs.direction, legs.origin, legs.point, legs.length, strict=True):
+        span = pose[:3] + turned(pose) @ point - origin
+        if not d.any():
+            joints.append(np.linalg.norm(span))
+            continue
+
+        def excess(q, span=span, d=d, length=length):
+            return np.linalg.norm(span - q * d) - length
+
+        nearest = span @ d  # the rail passes the leg's end here
+        joints.append(
+            brentq(excess, nearest - 2 * length, nearest, xtol=1e-13) if excess(nearest) < 0 else np.nan
+        )
+    return np.array(joints)
+
+
+def pose_of(joints, near, inverse):
+    """Pose whose joints these are, by MINPACK's hybrid method."""
+    from scipy.optimize import fsolve
+
+    return fsolve(lambda pose: inverse(pose) - joints, near, xtol=1e-13)
+
+
+def rates(function, axes, step=1e-3):
+    """Derivative of one row's values by each axis: central differences of fourth order."""
+    columns = []
+    for unit in step * np.eye(len(axes)):
+        near = function(axes + unit) - function(axes - unit)
+        far = function(axes + 2 * unit) - function(axes - 2 * unit)
+        columns.append((8 * near - far) / (12 * step))
+    return np.stack(columns, axis=1)
+
+
+def leg_twists(legs, position, rotation):
+    """Twist per joint rates: all six chains at once as one linear system in twist and passive rates."""
+    result = []
+    for active in range(6):
+        matrix, right = np.zeros((36, 36)), np.zeros(36)
+        for i in range(6):
+            d, end = legs.direction[i], position + rotation @ legs.point[i]
+            s = end - legs.origin[i]
+            along = s @ d
+            s = s - d * (along - np.sqrt(legs.length[i] ** 2 - s @ s + along**2))
+            u = np.cross(d, [0.3, 0.5, 0.8])
+            row = slice(6 * i, 6 * i + 6)
+            matrix[row, :6] = np.eye(6)
+            for k, (axis, r) in enumerate(
+                [(u, end - s), (np.cross(u, s), end - s), *((e, end) for e in np.eye(3))]
+            ):
+                axis = axis / np.linalg.norm(axis)
+                screw = [*np.cross(axis, position - r), *axis]  # omega x (tool - r)
+                matrix[row, 6 + 5 * i + k] = -np.array(screw)
+            if i == active:
+                right[6 * i : 6 * i + 3] = d
+        result.append(np.linalg.lstsq(matrix, right, rcond=None)[0][:6])
+    return np.stack(result, axis=1)
+
+
+def trilateration(centres, radius):
+    """Lower point at one distance from three centres (3,3), as surveyors do it: in the centres' own plane."""
+    first = centres[1] - centres[0]
+    d = np.linalg.norm(first)
+    ex = first / d
+    second = centres[2] - centres[0]
+    i = ex @ second
+    ey = second - i * ex
+    j = np.linalg.norm(ey)
+    ey = ey / j
+    x = d / 2
+    y = (i * i + j * j) / (2 * j) - i / j * x
+    up = np.cross(ex, ey)
+    return centres[0] + x * ex + y * ey - np.sqrt(radius**2 - x * x - y * y) * up * np.sign(up[2])
+
+
+def tilted(vector, a, c, pivot):
+    """A point of the workpiece in the machine: exponentials of the turns about z, then x, at the pivot."""
+    from scipy.linalg import expm
+
+    about_x = expm(a * np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0]]))
+    about_z = expm(c * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]]))
+    return about_x @ about_z @ (vector - pivot) + pivot
 
 
 # --- stability ------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ KERNEL = re.compile(r"^@kernel\ndef (\w+)", re.MULTILINE)
 # one another; those that are called from outside are compared, and the rest with them.
 TWINS = {
     "controllers/cross_coupling.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/estimators.py": ("naive.servo_loop", "test_loop.py"),
     "controllers/feedforward.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/loop.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/position_loop.py": ("naive.servo_loop", "test_simulation.py"),
@@ -23,8 +24,12 @@ TWINS = {
     "kernels/extremes.py": ("naive.extremes", "test_recording.py"),
     "kernels/foot_point.py": ("naive.polyline_distance", "test_contour.py"),
     "kernels/hats.py": ("naive.hat_widths", "test_smoothing.py"),
+    "kernels/kinematics_delta.py": ("naive.trilateration", "test_kinematics.py"),
+    "kernels/kinematics_legs.py": ("naive.leg_joints", "test_kinematics.py"),
+    "kernels/kinematics_trunnion.py": ("naive.tilted", "test_kinematics.py"),
     "kernels/knots.py": ("naive.knots", "test_shaped_programs.py"),
     "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
+    "kernels/linear.py": ("np.linalg", "test_kinematics.py"),
     "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),
     "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python
     "kernels/plain_rows.py": ("read_rows", "test_plain_rows.py"),  # the reader in Python

@@ -66,7 +66,8 @@ def key_place(tree: Tree, path: Sequence[str | int]) -> Place:
 
 
 def _located(tree: Tree, detail: ErrorDetails) -> tuple[Place, Path, ErrorDetails]:
-    place, path = locate(tree, detail["loc"])
+    within = cast("Path", _context(detail).get("within", ()))
+    place, path = locate(tree, (*detail["loc"], *within))
     if detail["type"] == "key":
         path = (*path, str(_context(detail)["key"]))
         place = key_place(tree, path)

@@ -7,9 +7,9 @@ from math import inf, isfinite, nextafter
 import yaml
 
 from cnc_shape.config.setup import Planning, Setup
-from cnc_shape.controllers import Control
+from cnc_shape.controllers import Control, CrossCoupling
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, FirstOrderLag
+from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive
 from cnc_shape.modes import Mode
 from cnc_shape.program import ROTARY
 from cnc_shape.units import DEGREE
@@ -33,11 +33,13 @@ def dump_machine(setup: Setup) -> str:
     """Return `setup` as a machine file; loading it gives an equal setup."""
     document: dict[str, object] = {
         "name": setup.machine.name,
-        "kinematics": {"type": "cartesian"},
+        "kinematics": {"type": setup.kinematics_choice.type, **setup.kinematics_choice.options},
         "axes": {axis.name: _axis(axis, setup) for axis in setup.machine.axes},
         "planning": _planning(setup.planning),
         "control": _control(setup.control),
     }
+    if setup.machine.joints:
+        document["joints"] = [{"drive": _drive(drive)} for drive in setup.machine.joints]
     if setup.tools:
         document["tools"] = [
             {"number": tool.number, "length_mm": tool.length, "diameter_mm": tool.diameter}
@@ -69,17 +71,19 @@ def _axis(axis: Axis, setup: Setup) -> dict[str, object]:
     keys: dict[str, object] = {
         "limits": _degrees(axis.limits) if axis.name in ROTARY else _millimetres(axis.limits)
     }
-    if isinstance(axis.drive, FirstOrderLag):
-        keys["drive"] = {
-            "type": "first_order_lag",
-            "time_constant_s": axis.drive.time_constant,
-            "gain": axis.drive.gain,
-        }
+    if axis.drive != IdealDrive():
+        keys["drive"] = _drive(axis.drive)
     if axis.modes:
         keys["modes"] = [_mode(mode) for mode in axis.modes]
     if choice := setup.choices.get(axis.name):
         keys["shaper"] = {"type": choice.type, **choice.options}
     return keys
+
+
+def _drive(drive: Drive) -> dict[str, object]:
+    if isinstance(drive, FirstOrderLag):
+        return {"type": "first_order_lag", "time_constant_s": drive.time_constant, "gain": drive.gain}
+    return {"type": "ideal"}
 
 
 def _millimetres(limits: Limits) -> dict[str, object]:
@@ -137,5 +141,21 @@ def _control(control: Control) -> dict[str, object]:
         model = {"model_time_constant_s": feed.model_time_constant, "model_gain": feed.model_gain}
         keys["feedforward"] = shares | {key: value for key, value in model.items() if value is not None}
     if couple := control.cross_coupling:
-        keys["cross_coupling"] = {"estimator": "tangent", "proportional_per_s": couple.proportional}
+        keys["cross_coupling"] = _cross_coupling(couple)
+    if control.jacobian_every != 1:
+        keys["jacobian_every"] = control.jacobian_every
     return keys
+
+
+def _cross_coupling(couple: CrossCoupling) -> dict[str, object]:
+    gains = {
+        "integral_per_s2": couple.integral,
+        "derivative": couple.derivative,
+        "orientation_per_s": couple.orientation,
+    }
+    return {
+        "estimator": couple.estimator.name.lower(),
+        "proportional_per_s": couple.proportional,
+        "form": couple.form.name.lower(),
+        **{key: gain for key, gain in gains.items() if gain},
+    }

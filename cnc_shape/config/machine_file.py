@@ -12,10 +12,10 @@ from pydantic import ValidationError
 
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.complaints import complaint, key_place, locate
+from cnc_shape.config.control import read_control
+from cnc_shape.config.joints import AxisModels, drive_of, read_joints, read_kinematics
 from cnc_shape.config.models import (
     AxesModel,
-    ControlModel,
-    FirstOrderLagModel,
     LinearAxisModel,
     MachineModel,
     ModeModel,
@@ -25,10 +25,9 @@ from cnc_shape.config.models import (
 from cnc_shape.config.setup import Planning, Setup, ShaperChoice, Shaping
 from cnc_shape.config.shaper_options import NONE, design, key_of
 from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refuse
-from cnc_shape.controllers import Control, CrossCoupling, Feedforward
 from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive, Machine
+from cnc_shape.machine import Axis, Machine
 from cnc_shape.modes import Mode
 from cnc_shape.program import Note
 from cnc_shape.shapers import SINGLE_MODE, Shaper
@@ -38,8 +37,6 @@ from cnc_shape.units import DEGREE
 VARIABLE: Final = "CNC_SHAPE_MACHINE"
 DEFAULT: Final = "xy_stage.yaml"
 STDIN: Final = "-"
-
-AxisModels = Mapping[str, LinearAxisModel | RotaryAxisModel]
 
 
 def machine_path(given: Path | str | None) -> Path:
@@ -91,9 +88,11 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     except ValidationError as error:
         raise complaint(source, tree, error) from None
     axes = _axis_models(model.axes)
+    kind, kinematics = read_kinematics(model)
     machine = Machine(
         name=_name(model, source, tree),
         axes=tuple(_axis(source, tree, name, axis) for name, axis in axes.items()),
+        joints=read_joints(source, tree, model, axes, kinematics),
     )
     if not axes:
         refuse(source, locate(tree, ("axes",))[0], "axes: a machine needs an axis", "add x: with its limits")
@@ -102,10 +101,12 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     setup = Setup(
         machine=machine,
         planning=_planning(source, tree, model.planning),
-        control=_control(model.control),
+        control=read_control(source, tree, model.control, kinematics),
         tools=_tools(source, tree, model),
         choices=choices,
         shapers={name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()},
+        kinematics_choice=kind,
+        kinematics=kinematics,
         warnings=tuple(f"{source}:{note.line}: warning: {note.message}" for note in notes),
         source=source,
     )
@@ -170,13 +171,7 @@ def _axis(source: str, tree: Tree, name: str, model: LinearAxisModel | RotaryAxi
         plain = Limits(plain.velocity, plain.acceleration, jerk * unit)
     if travel is not None:
         plain = Limits(plain.velocity, plain.acceleration, plain.jerk, (travel[0] * unit, travel[1] * unit))
-    return Axis(name, plain, _drive(model), _modes(source, tree, name, model.modes))
-
-
-def _drive(model: LinearAxisModel | RotaryAxisModel) -> Drive:
-    if isinstance(model.drive, FirstOrderLagModel):
-        return FirstOrderLag(model.drive.time_constant_s, model.drive.gain)
-    return IdealDrive()
+    return Axis(name, plain, drive_of(model.drive), _modes(source, tree, name, model.modes))
 
 
 def _modes(source: str, tree: Tree, axis: str, models: list[ModeModel]) -> tuple[Mode, ...]:
@@ -219,18 +214,6 @@ def _shaper(source: str, tree: Tree, axis: Axis, choice: ShaperChoice) -> Shaper
         key = key_of(error.argument)
         place, walked = locate(tree, path if key is None else (*path, key))
         refuse(source, place, f"{dotted(walked)}: {error.reason}", error.hint)
-
-
-def _control(model: ControlModel) -> Control:
-    feed, couple = model.feedforward, model.cross_coupling
-    return Control(
-        sample_time=model.sample_time_s,
-        position_gain=model.position_gain_per_s,
-        delay_samples=model.delay_samples,
-        feedforward=feed
-        and Feedforward(feed.velocity, feed.acceleration, feed.model_time_constant_s, feed.model_gain),
-        cross_coupling=couple and CrossCoupling(couple.proportional_per_s),
-    )
 
 
 def _planning(source: str, tree: Tree, model: PlanningModel) -> Planning:

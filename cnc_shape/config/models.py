@@ -6,13 +6,13 @@ more memory than there is.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
+from cnc_shape.config.kinematics import AnyKinematics
 from cnc_shape.config.shaper_options import AnyShaper
-from cnc_shape.config.strict import One, Strict, Zero, refuse_value
+from cnc_shape.config.strict import Strict, refuse_value
 
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 Gain = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -29,15 +29,6 @@ def _increasing(bounds: list[float]) -> list[float]:
 
 
 Interval = Annotated[list[Coordinate], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
-
-
-class CartesianModel(Strict):
-    """One drive per axis."""
-
-    values_not_built: ClassVar[Mapping[str, frozenset[str]]] = {
-        "type": frozenset({"corexy", "linear_delta", "cubic_parallel", "stewart", "trunnion_ac"})
-    }
-    type: Literal["cartesian"]
 
 
 class LinearLimits(Strict):
@@ -115,6 +106,12 @@ class AxesModel(Strict):
     c: RotaryAxisModel | None = None
 
 
+class JointModel(Strict):
+    """A joint: what moves it."""
+
+    drive: AnyDrive | None = None
+
+
 class PlanningModel(Strict):
     """How motion is planned."""
 
@@ -140,16 +137,12 @@ class FeedforwardModel(Strict):
 class CrossCouplingModel(Strict):
     """How the axes answer the contour error together."""
 
-    values_not_built: ClassVar[Mapping[str, frozenset[str]]] = {
-        "estimator": frozenset({"foot_point", "circle"}),
-        "form": frozenset({"scalar"}),
-    }
-    estimator: Literal["tangent"] = "tangent"
+    estimator: Literal["tangent", "foot_point", "circle"] = "foot_point"
     proportional_per_s: Gain
-    integral_per_s2: Zero = 0.0
-    derivative: Zero = 0.0
-    form: Literal["vector"] = "vector"
-    orientation_per_s: Zero = 0.0
+    integral_per_s2: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+    derivative: Annotated[float, Field(ge=0.0, le=1e3)] = 0.0
+    form: Literal["vector", "scalar"] = "vector"
+    orientation_per_s: Gain = 0.0
 
 
 class ControlModel(Strict):
@@ -161,7 +154,7 @@ class ControlModel(Strict):
     delay_samples: Annotated[int, Field(ge=0, le=1000)] = 0
     feedforward: FeedforwardModel | None = None
     cross_coupling: CrossCouplingModel | None = None
-    jacobian_every: One = 1
+    jacobian_every: Annotated[int, Field(ge=1, le=10**6)] = 1
 
 
 class ToolModel(Strict):
@@ -175,10 +168,11 @@ class ToolModel(Strict):
 class MachineModel(Strict):
     """A whole machine file."""
 
-    keys_not_built: ClassVar[frozenset[str]] = frozenset({"joints", "disturbances"})
+    keys_not_built: ClassVar[frozenset[str]] = frozenset({"disturbances"})
     name: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    kinematics: CartesianModel | None = None
+    kinematics: AnyKinematics | None = None
     axes: AxesModel
+    joints: list[JointModel] | None = None
     planning: PlanningModel = PlanningModel()
     control: ControlModel = ControlModel()
     tools: list[ToolModel] = Field(default_factory=list[ToolModel], max_length=1000)

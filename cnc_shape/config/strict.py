@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Annotated, Any, ClassVar, NoReturn, cast
+from typing import ClassVar, NoReturn, cast
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
 
 
@@ -20,26 +20,18 @@ class Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
     keys_not_built: ClassVar[frozenset[str]] = frozenset()
-    values_not_built: ClassVar[Mapping[str, frozenset[str]]] = {}
 
     @model_validator(mode="before")
     @classmethod
     def _know_every_key(cls, data: object) -> object:
         if not isinstance(data, Mapping):
             return data
-        for key, value in cast("Mapping[str, object]", data).items():
+        for key in cast("Mapping[str, object]", data):
             if key in cls.keys_not_built:
                 refuse_key(key, "not built yet", "remove it")
-            if isinstance(value, str) and value in cls.values_not_built.get(key, ()):
-                refuse_key(key, f"{value} is not built yet", _alternatives(cls, key))
             if key not in cls.model_fields:
                 refuse_key(key, "unknown key", suggestion(key, list(cls.model_fields)))
         return cast("object", data)
-
-
-def _alternatives(model: type[Strict], key: str) -> str:
-    words = getattr(model.model_fields[key].annotation, "__args__", ())
-    return ("use " + " or ".join(map(str, words))) if words else "remove it"
 
 
 def refuse_key(key: str, reason: str, hint: str) -> NoReturn:
@@ -47,9 +39,9 @@ def refuse_key(key: str, reason: str, hint: str) -> NoReturn:
     raise PydanticCustomError("key", "{reason}", {"key": key, "reason": reason, "hint": hint})
 
 
-def refuse_value(reason: str, hint: str) -> NoReturn:
-    """Raise the error of the value that is being checked."""
-    raise PydanticCustomError("value", "{reason}", {"reason": reason, "hint": hint})
+def refuse_value(reason: str, hint: str, within: tuple[str | int, ...] = ()) -> NoReturn:
+    """Raise the error of the value that is being checked, or of what the path `within` leads to in it."""
+    raise PydanticCustomError("value", "{reason}", {"reason": reason, "hint": hint, "within": within})
 
 
 def suggestion(word: str, known: list[str]) -> str:
@@ -61,16 +53,3 @@ def suggestion(word: str, known: list[str]) -> str:
     meant = [name for name in known if name.startswith(small + "_")] if small else []
     meant = meant or get_close_matches(small, known, n=1, cutoff=0.6)
     return f"did you mean {meant[0]}?" if meant else "known here: " + ", ".join(known)
-
-
-def _only(off: object) -> AfterValidator:
-    def check(value: Any) -> Any:
-        if value != off:
-            refuse_value(f"{value} is not built yet", f"use {off}, or remove the key")
-        return value
-
-    return AfterValidator(check)
-
-
-Zero = Annotated[float, _only(0.0)]  # a gain whose term is not built yet
-One = Annotated[int, _only(1)]  # a count whose other values are not built yet

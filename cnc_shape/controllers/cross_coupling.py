@@ -70,7 +70,7 @@ def gains(coupling: CrossCoupling | None) -> CrossCouplingGains:
 def step(
     gains: CrossCouplingGains,
     error: FloatArray,
-    tangent: FloatArray,
+    frame: FloatArray,
     sample_time: float,
     memory: FloatArray,
     speed: FloatArray,
@@ -79,28 +79,32 @@ def step(
 
     The integral acts from the next tick on; what of it lies along the path is dropped, as the path turns.
 
-    error (3,) mm; tangent (3,) unit; memory (3,3): the integral, mm s; the error before, mm; the integral of
-    its length, its length before, and 1 once there was one. speed (3,) mm/s.
+    error (3,) mm; frame (2,3): unit tangent, curvature; memory (3,3): the integral, mm s; the error before,
+    mm; the integral of its length, its length before, and 1 once there was one. speed (3,) mm/s.
     """
-    begun = memory[LENGTH, 2] > 0.0
+    # at the first tick there is no error before
+    damping = gains.derivative / sample_time if memory[LENGTH, 2] > 0.0 else 0.0
+    remembers = gains.integral > 0.0 or gains.derivative > 0.0
     if gains.form == VECTOR:
-        along = 0.0
         for i in range(3):
-            speed[i] = gains.proportional * error[i] + gains.integral * memory[0, i]
-            if begun:
-                speed[i] += gains.derivative * (error[i] - memory[ERROR, i]) / sample_time
-            memory[0, i] += sample_time * error[i]
-            memory[ERROR, i] = error[i]
-            along += memory[0, i] * tangent[i]
-        for i in range(3):
-            memory[0, i] -= along * tangent[i]
-    else:
-        length = sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
-        answer = gains.proportional * length + gains.integral * memory[LENGTH, 0]
-        if begun:
-            answer += gains.derivative * (length - memory[LENGTH, 1]) / sample_time
+            speed[i] = gains.proportional * error[i]
+        if remembers:
+            along = 0.0
+            for i in range(3):
+                speed[i] += gains.integral * memory[0, i] + damping * (error[i] - memory[ERROR, i])
+                memory[0, i] += sample_time * error[i]
+                memory[ERROR, i] = error[i]
+                along += memory[0, i] * frame[0, i]
+            for i in range(3):
+                memory[0, i] -= along * frame[0, i]
+            memory[LENGTH, 2] = 1.0
+        return
+    length = sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+    answer = gains.proportional * length
+    if remembers:
+        answer += gains.integral * memory[LENGTH, 0] + damping * (length - memory[LENGTH, 1])
         memory[LENGTH, 0] += sample_time * length
         memory[LENGTH, 1] = length
-        for i in range(3):
-            speed[i] = answer * error[i] / length if length > 0.0 else 0.0
-    memory[LENGTH, 2] = 1.0
+        memory[LENGTH, 2] = 1.0
+    for i in range(3):
+        speed[i] = answer * error[i] / length if length > 0.0 else 0.0

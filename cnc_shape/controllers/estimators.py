@@ -20,12 +20,33 @@ SMALLEST_ARM = 1e-9  # mm, from the centre of curvature: nearer to it every dire
 
 
 @kernel
+def look_ahead(velocity, acceleration, k, curved, frame):
+    """Set the unit tangent of a command at sample k, and its curvature if `curved`; at rest both stay.
+
+    velocity, acceleration (n,d) mm/s, mm/s^2; frame (2,3): unit tangent, curvature in 1/mm.
+    """
+    linear = min(3, velocity.shape[1])
+    speed_v2 = 0.0
+    for i in range(linear):
+        speed_v2 += velocity[k, i] ** 2
+    if speed_v2 <= 0.0:
+        return
+    scale = 1.0 / sqrt(speed_v2)
+    for i in range(linear):
+        frame[0, i] = velocity[k, i] * scale
+    if curved:
+        along = 0.0
+        for i in range(linear):
+            along += acceleration[k, i] * frame[0, i]
+        for i in range(linear):
+            frame[1, i] = (acceleration[k, i] - along * frame[0, i]) / speed_v2
+
+
+@kernel
 def tangent_error(tracking, frame, error):
     """Contour error by the tangent: tracking (>=3,) mm; frame (2,3): tangent, curvature; error (3,)."""
-    along = 0.0
-    for i in range(error.size):
-        along += tracking[i] * frame[0, i]
-    for i in range(error.size):
+    along = tracking[0] * frame[0, 0] + tracking[1] * frame[0, 1] + tracking[2] * frame[0, 2]
+    for i in range(3):
         error[i] = tracking[i] - along * frame[0, i]
 
 

@@ -75,10 +75,11 @@ def servo_loop(
     solved = inverse.shape[1]
     joint, rate = np.empty((n, joints)), np.empty((n, joints))
     tool, drive = np.empty((n, joints)), np.empty((n, joints))
-    following, mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints), np.empty(joints)
+    mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints)
+    following = np.zeros(max(joints, 3))
     told = np.empty(joints)
-    tracking, work = np.zeros(max(joints, 3)), np.empty((solved, solved))
-    coupled = following[:solved]
+    tracking = following if cartesian else np.zeros(max(joints, 3))
+    coupled, work = following[:solved], np.empty((solved, solved))
     error, speed = np.zeros(3), np.zeros(3)
     searched = n if couple and couple_gains.estimator == FOOT_POINT else 0
     tools, feet = np.empty((searched, 3)), np.empty((searched, 3))
@@ -93,29 +94,16 @@ def servo_loop(
             if not abs(following[j]) <= FURTHEST:
                 return joint, rate, tool, drive, k
             told[j] = 0.0
-            mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
-            mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
         position_loop.step(position_gains, following, told)
         if feed:
+            for j in range(joints):
+                mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
+                mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
             feedforward.step(feed_gains, mean_velocity, mean_acceleration, told)
         if couple:
-            speed_v2 = 0.0
-            for i in range(linear):
-                speed_v2 += velocity[k, i] ** 2
-            if speed_v2 > 0.0:
-                along = 0.0
-                for i in range(linear):
-                    frame[0, i] = velocity[k, i] / np.sqrt(speed_v2)
-                    along += acceleration[k, i] * frame[0, i]
-                for i in range(linear):
-                    frame[1, i] = (acceleration[k, i] - along * frame[0, i]) / speed_v2
+            estimators.look_ahead(velocity, acceleration, k, couple_gains.estimator == CIRCLE, frame)
             row = 0 if cartesian else (phase + k) // every
-            if cartesian:
-                for j in range(joints):
-                    tracking[j] = following[j]
-                for i in range(joints, 3):
-                    tracking[i] = 0.0
-            else:
+            if not cartesian:
                 solve(inverse[row], coupled, tracking, work)
             if couple_gains.estimator == FOOT_POINT:
                 estimators.foot_error(
@@ -126,7 +114,7 @@ def servo_loop(
                 estimators.circle_error(tracking, frame, error)
             else:
                 estimators.tangent_error(tracking, frame, error)
-            cross_coupling.step(couple_gains, error, frame[0], sample_time, coupling, speed)
+            cross_coupling.step(couple_gains, error, frame, sample_time, coupling, speed)
             if cartesian:
                 for i in range(linear):
                     told[i] += speed[i]

@@ -6,8 +6,8 @@ platform's point p + R point_i, c_i from the origin of its rail. Its foot slides
 
     q_i = c_i.d_i - sqrt(L_i^2 - |c_i|^2 + (c_i.d_i)^2),    s_i = c_i - q_i d_i,
 
-or, where d_i is zero, stays at the origin while the leg extends: q_i = |c_i|, s_i = c_i. A leg neither pushes nor
-pulls across itself, so the rates of joint and pose obey
+or, where d_i is zero, stays at the origin while the leg extends: q_i = |c_i|, s_i = c_i. A leg keeps its
+length but for what it extends, so the rates of joint and pose obey
 
     (s_i.d_i) q_i' = s_i.v + ((R point_i) x s_i).omega        (|c_i| q_i' = ... where the leg extends).
 """
@@ -22,7 +22,10 @@ from cnc_shape.kernels.linear import solve
 
 @kernel
 def turn_to(pose, rotation):
-    """Rotation matrix Rz(c) Ry(b) Rx(a) of pose (6,): into `rotation` (3,3)."""
+    """Rotation matrix Rz(c) Ry(b) Rx(a) of pose (6,), and beside it the axis that b turns about.
+
+    Into `rotation` (3,4).
+    """
     sa, ca = math.sin(pose[3]), math.cos(pose[3])
     sb, cb = math.sin(pose[4]), math.cos(pose[4])
     sc, cc = math.sin(pose[5]), math.cos(pose[5])
@@ -35,14 +38,27 @@ def turn_to(pose, rotation):
     rotation[0, 2] = cc * sb * ca + sc * sa
     rotation[1, 2] = sc * sb * ca - cc * sa
     rotation[2, 2] = cb * ca
-    return cc, sc
+    rotation[0, 3] = -sc
+    rotation[1, 3] = cc
+    rotation[2, 3] = 0.0
+
+
+@kernel
+def move_to(axes, pose, rotation):
+    """Move `pose` (6,) to axes (6,), and its `rotation` (3,4): most programs keep their angles for long."""
+    turns = pose[3] != axes[3] or pose[4] != axes[4] or pose[5] != axes[5]
+    for i in range(6):
+        pose[i] = axes[i]
+    if turns:
+        turn_to(pose, rotation)
 
 
 @kernel
 def leg_of(i, pose, rotation, direction, origin, point, length):
-    """Leg i at a pose: its joint, the arm R point_i, the vector s_i along the leg, and s_i.d_i or \\|c_i\\|.
+    """Leg i at a pose: its joint, the arm R point_i, the vector s_i along the leg, and s_i.d_i.
 
-    direction, origin, point (6,3); length (6,). A leg that cannot reach has a joint of nan.
+    direction, origin, point (6,3); length (6,). A leg that cannot reach has a joint of nan; one that
+    extends has its length instead of s_i.d_i.
     """
     ax = rotation[0, 0] * point[i, 0] + rotation[0, 1] * point[i, 1] + rotation[0, 2] * point[i, 2]
     ay = rotation[1, 0] * point[i, 0] + rotation[1, 1] * point[i, 1] + rotation[1, 2] * point[i, 2]
@@ -65,11 +81,11 @@ def leg_of(i, pose, rotation, direction, origin, point, length):
 @kernel
 def joints_of(axes, direction, origin, point, length, joints):
     """Joints of poses axes (n,6): into joints (n,6)."""
-    rotation = np.empty((3, 3))
+    rotation, pose = np.empty((3, 4)), np.full(6, np.nan)
     for row in range(axes.shape[0]):
-        turn_to(axes[row], rotation)
+        move_to(axes[row], pose, rotation)
         for i in range(6):
-            leg = leg_of(i, axes[row], rotation, direction, origin, point, length)
+            leg = leg_of(i, pose, rotation, direction, origin, point, length)
             joints[row, i] = leg[0]
 
 
@@ -77,9 +93,9 @@ def joints_of(axes, direction, origin, point, length, joints):
 def rates_at(pose, rotation, direction, origin, point, length, joint, rates):
     """Joints of one pose and their rates per rate of its axes: into joint (6,) and rates (6,6).
 
-    The angular velocity of angle rates is omega = a' R ex + b' (-sin c, cos c, 0) + c' ez.
+    rotation (3,4) as `turn_to` leaves it. The angular velocity of angle rates is
+    omega = a' R ex + b' (-sin c, cos c, 0) + c' ez.
     """
-    cc, sc = turn_to(pose, rotation)
     for i in range(6):
         joint[i], ax, ay, az, sx, sy, sz, reach = leg_of(i, pose, rotation, direction, origin, point, length)
         scale = 1.0 / reach
@@ -90,16 +106,17 @@ def rates_at(pose, rotation, direction, origin, point, length, joint, rates):
         rates[i, 1] = sy * scale
         rates[i, 2] = sz * scale
         rates[i, 3] = mx * rotation[0, 0] + my * rotation[1, 0] + mz * rotation[2, 0]
-        rates[i, 4] = my * cc - mx * sc
+        rates[i, 4] = mx * rotation[0, 3] + my * rotation[1, 3]
         rates[i, 5] = mz
 
 
 @kernel
 def jacobians_of(axes, direction, origin, point, length, rates):
     """Joint rates per axis rates at poses axes (n,6): into rates (n,6,6)."""
-    rotation, joint = np.empty((3, 3)), np.empty(6)
+    rotation, pose, joint = np.empty((3, 4)), np.full(6, np.nan), np.empty(6)
     for row in range(axes.shape[0]):
-        rates_at(axes[row], rotation, direction, origin, point, length, joint, rates[row])
+        move_to(axes[row], pose, rotation)
+        rates_at(pose, rotation, direction, origin, point, length, joint, rates[row])
 
 
 @kernel
@@ -109,7 +126,7 @@ def poses_of(joints, near, direction, origin, point, length, tolerance, rounds, 
     A step that does not bring the joints nearer is halved. Ends where the largest difference of a joint is
     below `tolerance` (mm); a row that is not there after `rounds` steps is nan.
     """
-    rotation, work = np.empty((3, 3)), np.empty((6, 6))
+    rotation, work = np.empty((3, 4)), np.empty((6, 6))
     rates = np.empty((6, 6))
     joint, lacking, step, pose = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     for row in range(joints.shape[0]):
@@ -118,6 +135,7 @@ def poses_of(joints, near, direction, origin, point, length, tolerance, rounds, 
         last = np.inf
         found = False
         for _ in range(rounds):
+            turn_to(pose, rotation)
             rates_at(pose, rotation, direction, origin, point, length, joint, rates)
             worst = 0.0
             for i in range(6):
@@ -143,10 +161,11 @@ def poses_of(joints, near, direction, origin, point, length, tolerance, rounds, 
 @kernel
 def turns_of(first, second, angle):
     """Angle of the rotation between the orientations of two poses (n,6) each: into angle (n,), rad."""
-    before, after, between = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    pose, other = np.full(6, np.nan), np.full(6, np.nan)
+    before, after, between = np.empty((3, 4)), np.empty((3, 4)), np.empty((3, 3))
     for row in range(first.shape[0]):
-        turn_to(first[row], before)
-        turn_to(second[row], after)
+        move_to(first[row], pose, before)
+        move_to(second[row], other, after)
         for i in range(3):
             for j in range(3):
                 between[i, j] = 0.0

@@ -1,5 +1,5 @@
 # pyright: basic
-"""A table that tilts about x (a) and turns about its own z (c), both through the pivot, below a fixed spindle.
+"""A table that tilts about x (a) and turns about its own z (c), both through the pivot.
 
 The point w of the workpiece is at m = Rx(a) Rz(c) (w - g) + g in the machine, g the pivot.
 """

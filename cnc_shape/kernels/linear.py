@@ -24,7 +24,6 @@ def solve(matrix, right, out, work):
         for i in range(k + 1, n):
             if abs(work[i, k]) > abs(work[pivot, k]):
                 pivot = i
-        determinant *= work[pivot, k]
         if work[pivot, k] == 0.0:
             out[:] = np.nan
             return 0.0
@@ -33,17 +32,72 @@ def solve(matrix, right, out, work):
             for j in range(k, n):
                 work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
             out[k], out[pivot] = out[pivot], out[k]
-        inverse = 1.0 / work[k, k]
+        determinant *= work[k, k]
+        scale = 1.0 / work[k, k]
+        work[k, k] = scale
         for i in range(k + 1, n):
-            factor = work[i, k] * inverse
+            factor = work[i, k] * scale
             for j in range(k + 1, n):
                 work[i, j] -= factor * work[k, j]
             out[i] -= factor * out[k]
     for k in range(n - 1, -1, -1):
+        total = out[k]
         for j in range(k + 1, n):
-            out[k] -= work[k, j] * out[j]
-        out[k] /= work[k, k]
+            total -= work[k, j] * out[j]
+        out[k] = total * work[k, k]
     return determinant
+
+
+@kernel
+def invert(matrix, out, work):
+    """Invert `matrix` by Gauss-Jordan elimination with partial pivoting: into `out`; (n,n) each.
+
+    `matrix` is kept, `work` is scratch. Returns the determinant; where it is 0 `out` is infinite.
+    """
+    n = matrix.shape[0]
+    work[:] = matrix
+    out[:] = 0.0
+    for i in range(n):
+        out[i, i] = 1.0
+    determinant = 1.0
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(work[i, k]) > abs(work[pivot, k]):
+                pivot = i
+        if work[pivot, k] == 0.0:
+            out[:] = np.inf
+            return 0.0
+        if pivot != k:
+            determinant = -determinant
+            for j in range(n):
+                work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
+                out[k, j], out[pivot, j] = out[pivot, j], out[k, j]
+        determinant *= work[k, k]
+        scale = 1.0 / work[k, k]
+        for j in range(n):
+            work[k, j] *= scale
+            out[k, j] *= scale
+        for i in range(n):
+            if i != k:
+                factor = work[i, k]
+                for j in range(n):
+                    work[i, j] -= factor * work[k, j]
+                    out[i, j] -= factor * out[k, j]
+    return determinant
+
+
+@kernel
+def norm(matrix):
+    """Largest sum of magnitudes in a column of `matrix` (n,n); nan where an entry is."""
+    largest = 0.0
+    for j in range(matrix.shape[1]):
+        total = 0.0
+        for i in range(matrix.shape[0]):
+            total += abs(matrix[i, j])
+        if not total <= largest:
+            largest = total
+    return largest
 
 
 @kernel
@@ -54,25 +108,10 @@ def conditions(matrices, rows, columns, number, determinant):
     number infinity, one with nan has nan.
     """
     size = rows.size
-    matrix, work = np.empty((size, size)), np.empty((size, size))
-    unit, column = np.zeros(size), np.empty(size)
+    matrix, inverse, work = np.empty((size, size)), np.empty((size, size)), np.empty((size, size))
     for k in range(matrices.shape[0]):
-        norm = 0.0
-        for j in range(size):
-            total = 0.0
-            for i in range(size):
+        for i in range(size):
+            for j in range(size):
                 matrix[i, j] = rows[i] * matrices[k, i, j] * columns[j]
-                total += abs(matrix[i, j])
-            if not total <= norm:
-                norm = total
-        inverse_norm = 0.0
-        for j in range(size):
-            unit[j] = 1.0
-            determinant[k] = solve(matrix, unit, column, work)
-            unit[j] = 0.0
-            total = 0.0
-            for i in range(size):
-                total += abs(column[i])
-            if not total <= inverse_norm:
-                inverse_norm = total
-        number[k] = np.inf if determinant[k] == 0.0 else norm * inverse_norm
+        determinant[k] = invert(matrix, inverse, work)
+        number[k] = norm(matrix) * norm(inverse)

@@ -73,7 +73,8 @@ def _passive(d: FloatArray, slider: FloatArray, end: FloatArray) -> FloatArray:
     The first axis of the universal joint is fixed on the slider, square to its rail; which one does not
     matter to the platform.
     """
-    first = np.cross(d, np.eye(3)[np.argmin(np.abs(d))])
+    least_along: FloatArray = np.eye(3)[np.argmin(np.abs(d))]
+    first = np.cross(d, least_along)
     second = np.cross(first, end - slider)
     axes = np.vstack([first / np.linalg.norm(first), second / np.linalg.norm(second), np.eye(3)])
     through = np.vstack([slider, slider, end, end, end])

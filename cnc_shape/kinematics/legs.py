@@ -28,7 +28,7 @@ class Legs:
 
 
 def triple_rows(name: str, values: FloatArray, count: int = 6) -> FloatArray:
-    """Return six finite vectors as a frozen array, or raise ValueError with the `name` of what is not that."""
+    """Return `count` finite vectors as a frozen array; else raise ValueError with the `name`."""
     array = frozen(values)
     if array.shape != (count, 3):
         raise ValueError(f"{name} has shape {array.shape}, not ({count}, 3)")
@@ -76,12 +76,13 @@ def twist_jacobian(legs: Legs, position: FloatArray, rotation: FloatArray) -> Fl
     """
     arm = legs.point @ rotation.T
     c = position + arm - legs.origin
-    along = (c * legs.direction).sum(axis=1)
-    distance_v2 = (c * c).sum(axis=1)
-    extends = ~legs.direction.any(axis=1)
-    radicand = np.where(extends, distance_v2, legs.length**2 - distance_v2 + along**2)
+    along: FloatArray = np.einsum("ij,ij->i", c, legs.direction)
+    square: FloatArray = np.einsum("ij,ij->i", c, c)
+    slides = np.any(legs.direction != 0.0, axis=1)
+    radicand: FloatArray = np.where(slides, legs.length**2 - square + along**2, square)
     reach = np.sqrt(np.where(radicand > 0.0, radicand, np.nan))
-    s = np.where(extends[:, None], c, c - (along - reach)[:, None] * legs.direction)
+    s = np.where(slides, along - reach, 0.0)
+    s = c - s[:, None] * legs.direction
     return np.hstack([s, np.cross(arm, s)]) / reach[:, None]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cnc_shape.arrays import BoolArray, FloatArray, frozen
+from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kernels.linear import conditions
 from cnc_shape.kinematics.kinematics import Kinematics
 
@@ -24,7 +24,7 @@ def first_refusal(kinematics: Kinematics, axes: FloatArray) -> tuple[int, str] |
         block = axes[begin : begin + BLOCK]
         joints = kinematics.inverse(block)
         number, determinant = condition(kinematics, block)
-        reached: BoolArray = np.isfinite(joints).all(axis=1)
+        reached = np.all(np.isfinite(joints), axis=1)
         if begin == 0:
             sign = float(np.sign(determinant[0]))
         through = np.sign(determinant) != sign

@@ -27,7 +27,8 @@ def summary_json(summary: Summary) -> dict[str, Any]:
     """Everything a run says, as the JSON that others rely on.
 
     Rotary axes have keys of their own, in thousandths of a degree, and only where there are any:
-    ``following_rms_mdeg``, ``residual_vibration_mdeg``.
+    ``following_rms_mdeg``, ``residual_vibration_mdeg``; so have machines that turn tool or workpiece:
+    ``orientation_rms_mdeg``, ``orientation_max_mdeg``, apart from the contour error.
 
     Raises
     ------
@@ -66,6 +67,16 @@ def case_json(case: CaseSummary) -> dict[str, Any]:
         "tool_contour_max_um": _um(case.tool.max),
         **by_unit("following_rms", case.following_rms),
         **by_unit("residual_vibration", case.residual_vibration),
+        **_turn(case),
+    }
+
+
+def _turn(case: CaseSummary) -> dict[str, float]:
+    if case.turn is None:
+        return {}
+    return {
+        "orientation_rms_mdeg": case.turn.rms / MILLIDEGREE,
+        "orientation_max_mdeg": case.turn.max / MILLIDEGREE,
     }
 
 
@@ -126,6 +137,10 @@ def micrometres(value: float) -> str:
     return f"{um:.1f}" if um >= 9.995 else f"{um:.2f}"
 
 
+def _mdeg(angle: float) -> str:
+    return f"{angle / MILLIDEGREE:.3g}"
+
+
 def change(value: float, first: float) -> str:
     """Change against the first row: signed per cent, or a factor from tenfold on."""
     if first <= 0.0:
@@ -159,11 +174,14 @@ def columns(summary: Summary) -> tuple[Column, ...]:
         ("", "") if c is first else (change(c.tool.rms, first.tool.rms), change(c.tool.max, first.tool.max))
         for c in cases
     ]
+    turns = [case.turn for case in cases if case.turn is not None]
+    turning = (Column("turned", "m°", tuple((_mdeg(t.rms), _mdeg(t.max)) for t in turns)),) if turns else ()
     return (
         Column("tool", "µm", tuple(pair(case.tool) for case in cases)),
         Column("change", "of tool", tuple(changes)),
         Column("drives", "µm", tuple(pair(case.drives) for case in cases)),
         Column("command", "µm", tuple(pair(case.command) for case in cases)),
+        *turning,
         Column("cycle", "s", tuple((f"{case.cycle_time:.3f}",) for case in cases)),
         Column("vibration", "µm", tuple((micrometres(worst_linear(c.residual_vibration)),) for c in cases)),
         Column("following", "µm", tuple((micrometres(worst_linear(case.following_rms)),) for case in cases)),
