@@ -28,6 +28,7 @@ from cnc_shape.controllers.loop_model import (
 from cnc_shape.controllers.margins import largest_factors
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import Axis, Drive, FirstOrderLag
+from cnc_shape.program import ROTARY
 
 GAIN_RESOLUTION = 1e-5  # -, of the largest stable gain that is told
 MOST_STATES = 120  # of a loop whose poles are computed
@@ -65,7 +66,8 @@ def check_stability(axes: Sequence[Axis], control: Control) -> None:
         Names what is unstable, its gain and the largest stable one.
     """
     axes, control = cartesian_loop(axes, control)
-    names, drives = [f"axis {axis.name}" for axis in axes], [axis.drive for axis in axes]
+    names = [f"{'axis' if axis.name in (*LINEAR, *ROTARY) else 'joint'} {axis.name}" for axis in axes]
+    drives = [axis.drive for axis in axes]
     _check(names, drives, control, *_everywhere(np.eye(len(drives))[None], DIRECTIONS), _nowhere)
 
 
