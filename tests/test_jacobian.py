@@ -14,6 +14,7 @@ from cnc_shape.config import bundled, load_machine
 from cnc_shape.config.jacobian import check_jacobian
 from cnc_shape.config.kinematics import rails_of
 from cnc_shape.errors import InfeasibleError, OptionError
+from cnc_shape.kinematics.cubic_parallel import reciprocal_jacobian
 from cnc_shape.kinematics.cubic_parallel_screws import screw_jacobian_as_printed
 
 CUBE = str(bundled("cubic_parallel.yaml"))
@@ -167,3 +168,17 @@ def test_the_library_raises_what_the_command_tells():
         check_jacobian(setup, [1000.0])
     with pytest.raises(OptionError, match="6 numbers"):
         check_jacobian(setup, [0.0] * 7)
+
+
+def test_a_radian_counts_as_its_millimetres_between_the_formulas(monkeypatch):
+    """At home the largest entry is 1 mm per mm; 1e-3 rad/mm, at 60 mm a radian, are 6 % of it."""
+
+    def off(rails, position, rotation):
+        found = np.linalg.inv(reciprocal_jacobian(rails, position, rotation))
+        found[4, 2] += 1e-3
+        return found
+
+    monkeypatch.setattr("cnc_shape.config.jacobian.screw_jacobian", off)
+    formulas = check_jacobian(load_machine(CUBE))["formulas"]
+    assert isinstance(formulas, dict)
+    assert formulas["largest_relative_difference"] == pytest.approx(0.06)
