@@ -87,10 +87,8 @@ def machine() -> Figure:
     axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     axes.set_aspect("equal")
     axes.view_init(24.0, 40.0)
-    axes.set_box_aspect(None, zoom=1.15)
-    axes.set_title(
-        f"Fig. 3: six sliders, links of 300 mm, platform of ±{HALF_WIDTH:g} mm, the tool on the fan"
-    )
+    axes.set_box_aspect(None, zoom=0.97)
+    axes.set_title(f"Fig. 3: six sliders, links of 300 mm, platform of ±{HALF_WIDTH:g} mm", loc="left")
     return figure
 
 
