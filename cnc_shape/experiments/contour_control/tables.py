@@ -110,7 +110,9 @@ def claim_table() -> Table:
         "What the paper shows is curves without numbers, and its gains, its geometry and the points of its "
         "fan are not told. So this is the claim alone, on a machine, a fan and gains that we chose: it "
         "holds where the cross-coupling gain is about half the position gain, Kp = 20 1/s, or with "
-        "feedforward.",
+        "feedforward. Besides, the caption of Fig. 4 speaks of biaxial experiments where there is a "
+        "simulation of six axes, the text calls Fig. 6 a second Fig. 5, the error of the joints is φ in "
+        "section 2.2 and e in 4.1, and the work cited as [5] in the introduction is not the [5] of its list.",
     )  # fmt: skip
 
 
