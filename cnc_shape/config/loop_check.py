@@ -16,7 +16,6 @@ from cnc_shape.controllers.stability import (
     largest_stable_coupling,
 )
 from cnc_shape.joints import joints_of
-from cnc_shape.kinematics import weighed
 from cnc_shape.machine import FirstOrderLag
 from cnc_shape.units import DEGREE
 
@@ -42,7 +41,7 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
         home = np.eye(len(axes))[None]
     else:
         axes = joints.drives[: joints.coupled]
-        home = weighed(joints.kinematics, joints.inverse_jacobian(np.zeros((1, len(axes)))))
+        home = joints.inverse_jacobian(np.zeros((1, len(axes))))
         home = home[np.isfinite(home).all(axis=(1, 2))]
         home = home[np.linalg.cond(home) < SINGULAR]
         check_poses([axis.drive for axis in axes], control, home)

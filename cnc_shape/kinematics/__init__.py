@@ -5,7 +5,7 @@ from cnc_shape.kinematics.corexy import corexy
 from cnc_shape.kinematics.cubic_parallel import Rails, cubic_parallel, cubic_rails
 from cnc_shape.kinematics.kinematics import Kinematics
 from cnc_shape.kinematics.linear_delta import linear_delta
-from cnc_shape.kinematics.reach import first_refusal, weighed
+from cnc_shape.kinematics.reach import first_refusal
 from cnc_shape.kinematics.stewart import stewart
 from cnc_shape.kinematics.trunnion_ac import trunnion_ac
 
@@ -30,5 +30,4 @@ __all__ = [
     "linear_delta",
     "stewart",
     "trunnion_ac",
-    "weighed",
 ]

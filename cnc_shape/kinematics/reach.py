@@ -51,12 +51,6 @@ def condition(kinematics: Kinematics, axes: FloatArray) -> tuple[FloatArray, Flo
     return number, determinant
 
 
-def weighed(kinematics: Kinematics, inverse_jacobians: FloatArray) -> FloatArray:
-    """Inverse Jacobians (n,d,d) as pure numbers: a radian weighs as much as `kinematics.radian` mm."""
-    rows, columns = _weights(kinematics)
-    return rows[:, None] * inverse_jacobians * columns
-
-
 def _weights(kinematics: Kinematics) -> tuple[FloatArray, FloatArray]:
     """Weights of joints and of axes, (d,) each."""
     mm = kinematics.radian
