@@ -264,8 +264,18 @@ def test_sensitivity_of_unlike_drives_is_the_largest_singular_value():
     loop = Control(T, 20.0, 1, None, pid(80.0, "PID"))
     model = loop_model(DRIVES, loop, AT, Z[None])
     transfer = loop_transfer(model, np.exp(1j * T * np.geomspace(0.1, np.pi / T, 20_000)))[0]
+    lever = np.diag(np.linalg.norm(np.linalg.inv(AT[0])[:3], axis=0))  # mm at the tool per mm of a joint
+    transfer = lever @ transfer @ np.linalg.inv(lever)
     brute = np.linalg.norm(np.linalg.inv(np.eye(6) + transfer), ord=2, axis=(1, 2)).max()
     assert_allclose(margins(DRIVES, loop, AT[0], Z).sensitivity, brute, rtol=1e-6)
+
+
+def test_margins_do_not_depend_on_the_unit_of_a_joint():
+    loop = Control(T, 20.0, 1, None, pid(80.0, "PID"))
+    degrees = np.diag([1.0, 57.3, 1.0, 1.0, 1.0, 0.01]) @ AT[0]
+    found, other = margins(DRIVES, loop, AT[0], Z), margins(DRIVES, loop, degrees, Z)
+    for name in ("gain", "phase", "sensitivity", "delay"):
+        assert_allclose(getattr(other, name), getattr(found, name), rtol=1e-5)
 
 
 def test_worst_margins_are_those_of_the_worst_directions():
