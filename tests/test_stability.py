@@ -25,7 +25,7 @@ from cnc_shape.controllers.loop_model import (
     open_loop,
     poles,
 )
-from cnc_shape.controllers.margins import Margins, margins, worst_margins
+from cnc_shape.controllers.margins import Margins, _over_negative_axis, margins, worst_margins
 from cnc_shape.controllers.stability import (
     DIRECTIONS,
     check_along,
@@ -268,6 +268,12 @@ def test_sensitivity_of_unlike_drives_is_the_largest_singular_value():
     transfer = lever @ transfer @ np.linalg.inv(lever)
     brute = np.linalg.norm(np.linalg.inv(np.eye(6) + transfer), ord=2, axis=(1, 2)).max()
     assert_allclose(margins(DRIVES, loop, AT[0], Z).sensitivity, brute, rtol=1e-6)
+
+
+def test_a_curve_over_the_positive_axis_is_not_taken_for_one_over_the_negative():
+    """Angles from the negative axis: one passes half a turn, which shifts the sorted others by a place."""
+    angles = np.array([[-1.0, 0.5, 3.1], [-1.0, 0.5, 3.2], [-0.1, 0.5, 3.2], [0.1, 0.5, 3.2]])
+    assert_array_equal(_over_negative_axis(-np.exp(1j * angles)), [False, False, True])
 
 
 def test_margins_do_not_depend_on_the_unit_of_a_joint():
