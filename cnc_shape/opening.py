@@ -96,7 +96,8 @@ def open_motion(
             every = tuple(dict.fromkeys((*timings, *watched)))
             chunks = _noted(opened.chunks, motion.notes)
             machine = planner or setup.machine
-            blocks = moving(chunks, machine, setup.planning.path_tolerance, period, every)
+            planning = setup.planning
+            blocks = moving(chunks, machine, planning.path_tolerance, period, every, planning.path_limits)
         motion.blocks = _watched(blocks, motion)
         yield motion
 
