@@ -195,7 +195,7 @@ def worst_violation(
     if path_limits != NO_PATH_LIMITS:
         more, more_places = path_excesses(
             profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk, profile.cell,
-            path.coefficients, rotary_only(path), path_limits.acceleration,
+            path.coefficients, rotary_only(path), float(path_limits.acceleration),
             *(path_limits.chord or (0.0, 0.0)), points,
         )  # fmt: skip
         ratios, places = np.append(ratios, more), np.append(places, more_places)

@@ -56,7 +56,7 @@ class PathLimits:
         """Interpolation period (s) and chord error (mm), where chords limit the feed."""
         if self.interpolation_period is None or self.chord_error is None:
             return None
-        return self.interpolation_period, self.chord_error
+        return float(self.interpolation_period), float(self.chord_error)
 
 
 NO_PATH_LIMITS = PathLimits()  # as fast as the axes and the feed allow
