@@ -4,9 +4,9 @@ Curvature. With ``q'`` quadratic in s, ``q' x q''`` is quadratic as well, so
 
     K^2 = |q' x q''|^2 / |q'|^6
 
-is the quotient of N, of degree 4, and the cube of D, of degree 4. On any stretch of the cell it is at most
-the largest Bernstein coefficient of N over the cube of the smallest of D; halving the stretches finds the
-maximum between the ends, too.
+is the quotient of N, of degree 4, and the cube of D, of degree 4. It is nowhere above K^2 on a stretch of the
+cell if no Bernstein coefficient of ``N - K^2 D^3`` is positive; halving the stretches finds the maximum
+between the ends, too.
 
 Acceleration. The speed along the path changes by ``q' . (q' a + q'' x) / |q'|``. That is within +-A where
 
@@ -25,6 +25,9 @@ from cnc_shape.kernels.speed_limits import add_square
 ALONG_ROWS = 5  # Bernstein coefficients of the acceleration along the path, of degree 4
 CURVATURE_SHARE = 1e-6  # -, of the squared curvature, by which a bound may exceed what was found
 MOST_HALVINGS = 40
+FOUR = (1.0, 4.0, 6.0, 4.0, 1.0)  # binomials
+EIGHT = (1.0, 8.0, 28.0, 56.0, 70.0, 56.0, 28.0, 8.0, 1.0)
+MOST_STRETCHES = 1000  # looked at in one cell, from which their bounds are taken as they are
 LEAST_SHARE = 0.1  # -, of the largest |q'|: where t . q' is less, the cell turns too far for one direction
 
 
@@ -78,8 +81,29 @@ def square_of_quadratic(c0, c1, c2, powers):
 
 
 @kernel
+def nowhere_above(top, bottom, level):
+    """Whether ``N <= level D^3`` by the Bernstein coefficients (5,) of N and D.
+
+    With their binomials multiplied in, coefficients of products are sums over pairs.
+    """
+    plain = np.zeros(13)
+    cube = np.zeros(13)
+    for i in range(5):
+        for j in range(9):
+            plain[i + j] += FOUR[i] * top[i] * EIGHT[j]
+        for j in range(5):
+            pair = FOUR[i] * bottom[i] * FOUR[j] * bottom[j]
+            for n in range(5):
+                cube[i + j + n] += pair * FOUR[n] * bottom[n]
+    highest = -np.inf
+    for r in range(13):
+        highest = max(highest, plain[r] - level * cube[r])
+    return highest <= 0.0
+
+
+@kernel
 def largest_curvature(rows, h, enough):
-    """Largest squared curvature of XYZ in a cell, or a bound for it if that is no more than `enough`."""
+    """Largest squared curvature of XYZ in a cell; if that is no more than `enough`, any value up to it."""
     d = min(rows.shape[1], 3)
     above = np.zeros(5)
     below = np.zeros(5)
@@ -97,29 +121,31 @@ def largest_curvature(rows, h, enough):
     top = np.empty(5)
     bottom = np.empty(5)
     waiting = 1
+    looked = 0
     found = 0.0
     bound = 0.0
     while waiting > 0:
         waiting -= 1
+        looked += 1
         at = start[waiting]
         level = depth[waiting]
         width = h * 0.5**level
         bernstein(above, at, width, top)
         bernstein(below, at, width, bottom)
-        least = bottom.min()
-        most = max(top.max(), 0.0)
-        ceiling = np.inf if least <= 0.0 and most > 0.0 else 0.0 if most == 0.0 else most / least**3
         for end in (0, 4):
             if bottom[end] > 0.0:
                 found = max(found, top[end] / bottom[end] ** 3)
-        if ceiling <= max(found * (1.0 + CURVATURE_SHARE), enough) or level == MOST_HALVINGS:
-            bound = max(bound, ceiling)
+        if nowhere_above(top, bottom, max(found * (1.0 + CURVATURE_SHARE), enough)):
+            continue
+        if level == MOST_HALVINGS or looked > MOST_STRETCHES:
+            least = bottom.min()
+            bound = max(bound, top.max() / least**3 if least > 0.0 else np.inf)
             continue
         for half in range(2):
             start[waiting] = at + half * 0.5 * width
             depth[waiting] = level + 1
             waiting += 1
-    return bound
+    return max(found * (1.0 + CURVATURE_SHARE), bound)
 
 
 @kernel
