@@ -172,15 +172,16 @@ def test_random_programs_keep_every_limit(seed, path_limits, tolerance):
 
 
 @settings(max_examples=30, deadline=None, derandomize=True)
-@given(st.integers(0, 10**6), st.sampled_from([3, 5, 12]))
-def test_cells_that_turn_back_on_themselves_keep_every_limit(seed, spans):
-    """A spline through points at random in three cells a span: |q'| comes near to 0 within a cell."""
-    points = np.random.default_rng(seed).normal(size=(spans, 3)) * [10.0, 0.5, 0.1]
-    path, _ = spline_path(points, per_span=3)
+@given(st.integers(0, 10**6), st.sampled_from([2, 3, 4]))
+def test_cells_that_turn_back_on_themselves_keep_every_limit(seed, per_span):
+    """A spline to and fro in a few cells a span: there is no direction that all of a cell goes along."""
+    points = np.random.default_rng(seed).normal(size=(6, 3)) * [1.0, 0.5, 0.1]
+    points[1::2, 0] += 10.0
+    path, _ = spline_path(points, per_span=per_span)
     path_limits = PathLimits(300.0)
     profile = plan(path, SWIFT, path_limits)
     assert worst_violation(profile, SWIFT, 33, path_limits).worst <= 1e-6
-    assert profile.end_time < 1e3
+    assert profile.end_time < 10.0
 
 
 def smooth_program(seed):
