@@ -132,6 +132,6 @@ def _stream(setup: Setup) -> None:
 def _certify(path: Path, setup: Setup) -> None:
     program = read_program(path)
     limits = [axis.limits for axis in setup.machine.with_axes(program.axes).axes]
-    path = smooth(build_toolpath(program), Smoothing(setup.planning.path_tolerance))
+    curve = smooth(build_toolpath(program), Smoothing(setup.planning.path_tolerance))
     for path_limits in (NO_PATH_LIMITS, PathLimits(500.0, 1e-3, 1e-3)):
-        worst_violation(plan(path, limits, path_limits), limits, path_limits=path_limits)
+        worst_violation(plan(curve, limits, path_limits), limits, path_limits=path_limits)
