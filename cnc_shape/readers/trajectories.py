@@ -1,4 +1,4 @@
-"""Time trajectories at the servo period. They bypass the planner; their path is their own polyline."""
+"""Time trajectories at the servo period. They bypass the planner; their path is that through their rows."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.readers.timed import TimedPoints, timed_program
-from cnc_shape.toolpath import Toolpath, build_toolpath, travel_lengths
+from cnc_shape.readers.timed import TimedPath
+from cnc_shape.toolpath import Toolpath, build_toolpath
 from cnc_shape.trajectory import Trajectory
 
 
+SAME_PERIOD = 1.0 + 1e-6  # -, of the sample time: rows no farther apart come with every sample
 CORNER = radians(20.0)  # between two steps: beyond, the path has a corner and does not bend
 
 
@@ -47,15 +48,18 @@ def rates(position: FloatArray, sample_time: float) -> tuple[FloatArray, FloatAr
     return velocity, acceleration
 
 
-def resample(points: TimedPoints, sample_time: float, *, samples: int) -> tuple[Trajectory, Toolpath]:
-    """Resample the rows linearly; return the commands and the polyline they are measured against.
+def resample(path: TimedPath, sample_time: float, *, samples: int) -> tuple[Trajectory, Toolpath]:
+    """Resample the rows; return the commands and the path they are measured against.
 
+    Positions lie on the straight line between two rows. Where the path is a spline, and rows that move are
+    farther apart than samples, they lie on the spline: its parameter goes with time through the rows as a
+    monotone cubic (PCHIP), so that commands keep the path, meet every row in time and never run back.
     Velocity and acceleration are `rates` of the resampled positions: all that a replayed table knows.
 
     Parameters
     ----------
-    points
-        The rows.
+    path
+        The rows, and the path through them.
     sample_time
         s.
     samples
@@ -66,6 +70,7 @@ def resample(points: TimedPoints, sample_time: float, *, samples: int) -> tuple[
     InfeasibleError
         More samples than `samples`.
     """
+    points = path.points
     steps = ceil(points.time[-1] / sample_time - 1e-9)
     if steps >= samples:
         raise InfeasibleError(
@@ -73,18 +78,30 @@ def resample(points: TimedPoints, sample_time: float, *, samples: int) -> tuple[
             hint="raise the limit of the samples or sample_time_s",
             source=points.source,
         )
-    program = timed_program(points)
-    along = np.concatenate([[0.0], np.cumsum(travel_lengths(program))])
-    time: FloatArray = np.arange(steps + 1, dtype=np.float64) * sample_time
+    time: FloatArray = np.minimum(np.arange(steps + 1) * sample_time, points.time[-1])
     columns: list[FloatArray] = [np.interp(time, points.time, column) for column in points.position.T]
+    place = np.interp(time, points.time, path.place)
+    if path.spline is not None and _coarser(path, sample_time):
+        from scipy.interpolate import PchipInterpolator  # pyright: ignore[reportUnknownVariableType]
+
+        spline = path.spline
+        parameter = PchipInterpolator(points.time, spline.parameter)(time)
+        columns[:3] = spline.at(parameter).T
+        place = np.interp(parameter, spline.node, spline.place)
     position = np.column_stack(columns)
     velocity, acceleration = rates(position, sample_time)
     trajectory = Trajectory(
         axes=points.axes,
         sample_time=sample_time,
-        arc_length=frozen(np.interp(time, points.time, along)),
+        arc_length=frozen(place),
         position=frozen(position),
         velocity=frozen(velocity),
         acceleration=frozen(acceleration),
     )
-    return trajectory, build_toolpath(program)
+    return trajectory, build_toolpath(path.program)
+
+
+def _coarser(path: TimedPath, sample_time: float) -> bool:
+    """Whether there are moving rows farther apart in time than samples."""
+    moving = np.diff(path.place) > 0.0
+    return bool((np.diff(path.points.time)[moving] > SAME_PERIOD * sample_time).any())
