@@ -20,7 +20,8 @@ END_MARGIN = 1e-6  # -, of a sample: a motion that ends within it after a sample
 class Trajectory:
     """A chunk of samples of the axis commands, analytic in position, velocity and acceleration.
 
-    The first sample of a motion is at t = 0; the last is the first at or after its end, at rest.
+    The first sample of a motion is at t = 0; the last is the first at or after its end, at rest. A replayed
+    command was given by its positions alone: its velocity and acceleration are differences of them.
     """
 
     axes: tuple[str, ...]
@@ -29,6 +30,7 @@ class Trajectory:
     position: FloatArray  # (n,d) mm or rad
     velocity: FloatArray  # (n,d) mm/s or rad/s
     acceleration: FloatArray  # (n,d) mm/s^2 or rad/s^2
+    replayed: bool = False
 
     def __len__(self) -> int:
         return self.arc_length.size
@@ -42,6 +44,7 @@ class Trajectory:
             self.position[rows],
             self.velocity[rows],
             self.acceleration[rows],
+            self.replayed,
         )
 
     def resting(self, row: int, samples: int) -> Trajectory:
@@ -49,7 +52,9 @@ class Trajectory:
         position = self.position[row]
         still = frozen(np.zeros((samples, position.size)))
         place = frozen(np.full(samples, self.arc_length[row]))
-        return Trajectory(self.axes, self.sample_time, place, frozen(still + position), still, still)
+        return Trajectory(
+            self.axes, self.sample_time, place, frozen(still + position), still, still, self.replayed
+        )
 
     def late_arc_length(self, first: int, delay: float) -> FloatArray:
         """The place from sample `first` on, `delay` samples ago, linear between samples."""
@@ -134,6 +139,7 @@ def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
         frozen(np.concatenate([part.position for part in parts])),
         frozen(np.concatenate([part.velocity for part in parts])),
         frozen(np.concatenate([part.acceleration for part in parts])),
+        parts[-1].replayed,
     )
 
 

@@ -34,7 +34,7 @@ class Circle:
         return np.cross(self.along, self.across)
 
     def angle(self, position: FloatArray) -> FloatArray:
-        """Angle of the nearest points to (n,3) mm, (n,) rad, by less than a half turn from one to the next."""
+        """Angle of the points nearest to (n,3) mm, (n,) rad; steps are less than a half turn."""
         arm = position - self.center
         return np.unwrap(np.arctan2(arm @ self.across, arm @ self.along))
 
@@ -108,14 +108,14 @@ def fit_circle(points: TimedPoints) -> Circle:
     radius = np.inf
     center = np.zeros(2)
     if not straight:
-        algebraic = np.linalg.lstsq(np.column_stack([x, y, np.ones_like(x)]), x * x + y * y, rcond=None)[0]
+        algebraic = _least_squares(np.column_stack([x, y, np.ones_like(x)]), x * x + y * y)
         center = algebraic[:2] / 2.0
         radius = float(np.sqrt(algebraic[2] + center @ center))
         for _ in range(10):
             dx, dy = x - center[0], y - center[1]
             arm = np.hypot(dx, dy)
             slope = np.column_stack([dx / arm, dy / arm, np.ones_like(arm)])
-            step = np.linalg.lstsq(slope, arm - radius, rcond=None)[0]
+            step = _least_squares(slope, arm - radius)
             center, radius = center + step[:2], radius + float(step[2])
             if np.abs(step).max() < 1e-12 * radius:
                 break
@@ -128,6 +128,10 @@ def fit_circle(points: TimedPoints) -> Circle:
     return Circle(
         frozen(middle + center[0] * along + center[1] * across), radius, frozen(along), frozen(across)
     )
+
+
+def _least_squares(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    return frozen(np.linalg.lstsq(matrix, right, rcond=None)[0])
 
 
 def _refuse_rows_off(points: TimedPoints, circle: Circle) -> None:

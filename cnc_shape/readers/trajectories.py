@@ -12,7 +12,6 @@ from cnc_shape.readers.timed import TimedPath
 from cnc_shape.toolpath import Toolpath, build_toolpath
 from cnc_shape.trajectory import Trajectory
 
-
 SAME_PERIOD = 1.0 + 1e-6  # -, of the sample time: rows no farther apart come with every sample
 CORNER = radians(20.0)  # between two steps: beyond, the path has a corner and does not bend
 
@@ -22,9 +21,8 @@ def rates(position: FloatArray, sample_time: float) -> tuple[FloatArray, FloatAr
 
     They are central differences, the mean of the step that arrives at a sample and the one that leaves it:
     exact to the second order, and along the tangent wherever the path bends evenly. A corner has no tangent,
-    and the mean would point along neither side of it. There the velocity is that of arriving, so that a loop
-    which feeds ``(velocity[k+1] - velocity[k]) / T`` forward turns with the path and not a sample ahead of it,
-    and the acceleration is only what changes the speed: a corner is no curvature.
+    and the mean would point along neither side of it. There the velocity is that of arriving, and
+    the acceleration is only what changes the speed: a corner is no curvature.
 
     Parameters
     ----------
@@ -78,14 +76,15 @@ def resample(path: TimedPath, sample_time: float, *, samples: int) -> tuple[Traj
             hint="raise the limit of the samples or sample_time_s",
             source=points.source,
         )
-    time: FloatArray = np.minimum(np.arange(steps + 1) * sample_time, points.time[-1])
+    time: FloatArray = np.arange(steps + 1, dtype=np.float64) * sample_time
+    time = frozen(np.minimum(time, points.time[-1]))
     columns: list[FloatArray] = [np.interp(time, points.time, column) for column in points.position.T]
-    place = np.interp(time, points.time, path.place)
+    place: FloatArray = np.interp(time, points.time, path.place)
     if path.spline is not None and _coarser(path, sample_time):
         from scipy.interpolate import PchipInterpolator  # pyright: ignore[reportUnknownVariableType]
 
         spline = path.spline
-        parameter = PchipInterpolator(points.time, spline.parameter)(time)
+        parameter = frozen(PchipInterpolator(points.time, spline.parameter)(time))
         columns[:3] = spline.at(parameter).T
         place = np.interp(parameter, spline.node, spline.place)
     position = np.column_stack(columns)
@@ -97,6 +96,7 @@ def resample(path: TimedPath, sample_time: float, *, samples: int) -> tuple[Traj
         position=frozen(position),
         velocity=frozen(velocity),
         acceleration=frozen(acceleration),
+        replayed=True,
     )
     return trajectory, build_toolpath(path.program)
 
