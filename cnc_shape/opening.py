@@ -14,15 +14,21 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.chunks import with_last
 from cnc_shape.config.setup import Setup
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.joints import CARTESIAN, joints_of
 from cnc_shape.machine import LINEAR_DEFAULT, Machine
 from cnc_shape.motion import Block, lacking, moving, replaying
 from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
 from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.readers.trajectories import resample
+from cnc_shape.refusals import refuse_pose
 from cnc_shape.smoothing import Smoothing, smoothing
 from cnc_shape.timing import PLAIN, Timing
 from cnc_shape.toolpath import building
+from cnc_shape.trajectory import Trajectory, join_trajectories
+from cnc_shape.windows import Reach, WindowState, windowing
+
+NOWHERE_ELSE = Reach(0, 0, 0.0)  # a command is where it is
 
 
 @dataclass(slots=True)
@@ -97,7 +103,7 @@ def open_motion(
             chunks = _noted(opened.chunks, motion.notes)
             machine = planner or setup.machine
             blocks = moving(chunks, machine, setup.planning.path_tolerance, period, every)
-        motion.blocks = _watched(blocks, motion)
+        motion.blocks = _watched(_within_reach(blocks, setup, opened.source), motion)
         yield motion
 
 
@@ -152,6 +158,29 @@ def _noted(chunks: Iterable[Program], notes: list[Note]) -> Iterator[Program]:
     for chunk in chunks:
         notes.extend(chunk.notes)
         yield replace(chunk, notes=())
+
+
+def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterator[Block]:
+    """Refuse the first commanded pose that the machine cannot hold, with its line, before it goes further."""
+    if setup.kinematics.name == CARTESIAN.name:
+        yield from blocks
+        return
+    look = windowing(NOWHERE_ELSE)
+    places: WindowState | None = None
+    before: Trajectory | None = None
+    first: Timing | None = None
+    begun = False
+    for block in blocks:
+        first, begun = (first, True) if begun else (block.timing, True)
+        if block.timing == first:
+            command = block.command
+            places, windows = look(places, block.toolpath, command.arc_length, block.last)
+            if len(command):
+                command = command if before is None else join_trajectories([before, command])
+                joints = joints_of(setup.machine.with_axes(command.axes), setup.kinematics)
+                refuse_pose(joints, joints.pose(command.position), command.arc_length, windows, source)
+                before = command.cut(slice(-1, None))
+        yield block
 
 
 def _watched(blocks: Iterable[Block], motion: OpenMotion) -> Iterator[Block]:

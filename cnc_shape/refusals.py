@@ -124,7 +124,7 @@ def refuse_pose(
     row, reason = refused
     line = None
     if windows.path.low.size:
-        place = arc_length[min(row, arc_length.size - 1)]
+        place = float(arc_length[min(row, arc_length.size - 1)])
         found = min(int(np.searchsorted(windows.path.high, place)), windows.path.line.size - 1)
         line = int(windows.path.line[found])
     raise InfeasibleError(

@@ -191,8 +191,8 @@ class _Stage:
         refuse_divergence(self._joints, told.reference, ran, before, self._period, source)
         position, tool, turn = self._axes(now, pose, ran)
         response = Response(
-            command.cut(slice(0, ticks)), told.reference[:ticks], ran.joint, position, tool, ran.drive,
-            turn,
+            command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
+            ran.drive, turn,
         )  # fmt: skip
         settling = now.settling
         if last:

@@ -114,6 +114,8 @@ def test_rates_are_the_derivatives_of_the_joints(machine):
 def test_rows_do_not_know_one_another(machine):
     axes = poses(machine, 40)
     axes[10:20, 3:] = axes[10, 3:]  # an orientation that stays
+    for k in range(3, axes.shape[1]):  # and angles that change one at a time
+        axes[10 + k : 20, k] += 0.1
     joints, near = machine.inverse(axes), axes + poses(machine, 40, seed=2) / 60
     for cuts in ([7], [1, 2, 11, 12, 30], range(41)):
         edges = [0, *cuts, 40]
@@ -205,12 +207,19 @@ def test_condition_of_the_cube():  # spec of the experiment: 2.68 .. 4.69 over 2
     assert 4.3 < max(number) < 4.8
 
 
-@pytest.mark.parametrize("size", [1.0, 30.0])
+@pytest.mark.parametrize("size", [1.0, 30.0, 1000.0])
 def test_large_machines_are_found_too(size):
     rails = cubic_rails(60.0 * size, 300.0 * size, size * TOOL)
     machine = cubic_parallel(rails)
     axes = poses(machine, 300) * [size, size, size, 1, 1, 1]
     assert_allclose(machine.forward(machine.inverse(axes), 0 * axes), axes, rtol=0, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("name", ["cubic_parallel", "cubic_parallel of a user"])
+def test_steps_that_lead_too_far_are_halved(name):
+    machine = MACHINES[name]
+    axes = 2 * poses(machine, 2000, seed=0)  # from home, full steps lose three of the user's
+    assert_allclose(machine.forward(machine.inverse(axes), 0 * axes), axes, rtol=0, atol=1e-9)
 
 
 def test_a_pose_that_no_joints_hold_is_nan():

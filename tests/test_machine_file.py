@@ -22,7 +22,7 @@ from cnc_shape.config.setup import Planning, Setup, ShaperChoice, Shaping
 from cnc_shape.config.shaper_options import MODELS
 from cnc_shape.config.strict import Strict
 from cnc_shape.config.template import machine_template
-from cnc_shape.controllers import Control, CrossCoupling, Feedforward
+from cnc_shape.controllers import Control, CrossCoupling, Estimator, Feedforward, Form
 from cnc_shape.errors import CncShapeError, ConfigError, OptionError
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine
@@ -52,8 +52,8 @@ control:
   position_gain_per_s: 30
   delay_samples: 2
   feedforward: {velocity: 1, acceleration: 0.9, model_time_constant_s: 0.0148, model_gain: 1.0}
-  cross_coupling: {estimator: tangent, proportional_per_s: 80, integral_per_s2: 0, derivative: 0, form: vector, orientation_per_s: 0}
-  jacobian_every: 1
+  cross_coupling: {estimator: circle, proportional_per_s: 80, integral_per_s2: 800, derivative: 1.16, form: scalar, orientation_per_s: 0}
+  jacobian_every: 10
 tools: [{number: 1, length_mm: 50, diameter_mm: 6}]
 """
 
@@ -96,7 +96,14 @@ def test_every_key_of_the_contract_arrives() -> None:
             ),
         ),
         planning=Planning(0.02, Shaping.NONE),
-        control=Control(5e-4, 30.0, 2, Feedforward(1.0, 0.9, 0.0148, 1.0), CrossCoupling(80.0)),
+        control=Control(
+            5e-4,
+            30.0,
+            2,
+            Feedforward(1.0, 0.9, 0.0148, 1.0),
+            CrossCoupling(80.0, Estimator.CIRCLE, 800.0, 1.16, Form.SCALAR),
+            jacobian_every=10,
+        ),
         tools=(Tool(1, 50.0, 6.0),),
         choices={
             "x": ShaperChoice("cascade", {"of": "zvd"}),
@@ -218,7 +225,11 @@ def test_every_misspelt_key_is_refused_where_it_stands(path: tuple[object, ...])
     text, wrong = _misspelt(path)
     error = refusal(text)
     line = text.splitlines()[(error.line or 0) - 1]
-    if path[-1] == "type" and path[-2] in ("drive", "shaper"):  # what the other keys mean hangs on it
+    if path[-1] == "type" and path[-2] in (
+        "drive",
+        "shaper",
+        "kinematics",
+    ):  # what the other keys mean hangs on it
         assert error.reason.endswith("type is missing")
         return
     assert error.reason.endswith(f"{wrong}: unknown key")
@@ -307,10 +318,7 @@ def test_what_an_axis_cannot_be_is_refused_at_its_place(text: str, column: int, 
         (SMALL + "name: ''", (2, 7), "name: "),
         (SMALL + 'name: "a\\nb"', (2, 7), "name: must be one printable line"),
         (SMALL + 'name: "\\ud800"', (2, 7), "name: must be one printable line"),
-        (SMALL + "joints: []", (2, 1), "joints: not built yet"),
         (SMALL + "disturbances: []", (2, 1), "disturbances: not built yet"),
-        (SMALL + "kinematics: {type: corexy}", (2, 14), "kinematics.type: corexy is not built yet"),
-        (SMALL + "kinematics: {type: polar}", (2, 20), "kinematics.type: must be cartesian, not"),
         (SMALL + "planning: {shaping: axes}", (2, 21), "planning.shaping: must be contour, axis, path or none"),
         (SMALL + "planning: {chord_error_mm: 1}", (2, 12), "planning.chord_error_mm: not built yet"),
         (SMALL + "planning: {tool_tolerance_mm: 0}", (2, 31), "planning.tool_tolerance_mm: must be at least"),
@@ -320,17 +328,24 @@ def test_what_an_axis_cannot_be_is_refused_at_its_place(text: str, column: int, 
         (SMALL + "control: {delay_samples: 1.5}", (2, 26), "must be a whole number, not 1.5"),
         (SMALL + "control: {delay_samples: -1}", (2, 26), "must be at least 0, not -1"),
         (SMALL + "control: {delay_samples: 1e3}", (2, 26), "must be a whole number"),
-        (SMALL + "control: {jacobian_every: 2}", (2, 27), "control.jacobian_every: 2 is not built yet"),
+        (SMALL + "control: {jacobian_every: 0}", (2, 27), "control.jacobian_every: must be at least 1, not 0"),
+        (SMALL + "control: {jacobian_every: 1.5}", (2, 27), "jacobian_every: must be a whole number"),
         (SMALL + "control: {disturbance_observer: {}}", (2, 11), "disturbance_observer: not built yet"),
         (SMALL + "control: {inertia_compensation: {}}", (2, 11), "inertia_compensation: not built yet"),
         (SMALL + "control: {cross_coupling: {}}", (2, 27), "proportional_per_s is missing"),
-        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, estimator: foot_point}}", (2, 51),
-         "control.cross_coupling.estimator: foot_point is not built yet"),
-        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, integral_per_s2: 5}}", (2, 68),
-         "control.cross_coupling.integral_per_s2: 5.0 is not built yet"),
-        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, form: scalar}}", (2, 51), "not built"),
+        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, estimator: normal}}", (2, 62),
+         "cross_coupling.estimator: must be tangent, foot_point or circle, not the text 'normal'"),
+        (SMALL + "control: {cross_coupling: {proportional_per_s: -8}}", (2, 48), "must be at least 0, not -8"),
+        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, integral_per_s2: -5}}", (2, 68),
+         "control.cross_coupling.integral_per_s2: must be at least 0, not -5"),
+        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, derivative: -1}}", (2, 63),
+         "control.cross_coupling.derivative: must be at least 0, not -1"),
+        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, form: matrix}}", (2, 57),
+         "control.cross_coupling.form: must be vector or scalar, not the text 'matrix'"),
         (SMALL + "control: {cross_coupling: {proportional_per_s: 8, orientation_per_s: 1}}", (2, 70),
-         "control.cross_coupling.orientation_per_s: 1.0 is not built yet"),
+         "control.cross_coupling.orientation_per_s: the tool of a cartesian machine does not turn"),
+        (SMALL + "control: {cross_coupling: {proportional_per_s: 8, orientation_per_s: -1}}", (2, 70),
+         "control.cross_coupling.orientation_per_s: must be at least 0, not -1"),
         (SMALL + "tools: [{number: 1}, {number: 1}]", (2, 31), "tools[1].number: tool 1 is given twice"),
         (SMALL + "tools: [{number: -1}]", (2, 18), "must be at least 0"),
         ("axes: {x: {limits: {velocity_mm_s: 1, acceleration_mm_s2: 1, travel_mm: [3, 3]}}}", (1, 73),

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cnc_shape.config import bundled, check_machine
 from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.setup import Setup
-from cnc_shape.controllers import Control, CrossCoupling, Form
+from cnc_shape.controllers import Control, CrossCoupling, Form, stability
 from cnc_shape.controllers.loop import Command
 from cnc_shape.controllers.loop_model import (
     closed_loop,
@@ -202,29 +202,28 @@ def test_the_scalar_form_is_looked_at_by_its_proportional_part():
 # --- margins --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("gain", [20.0, 200.0])
-@pytest.mark.parametrize("delay", [0, 1, 4])
+@pytest.mark.parametrize(("gain", "delay"), [(20.0, 0), (200.0, 1), (30.0, 30)])
 def test_margins_of_a_joint_equal_python_control(gain, delay):
     loop = Control(T, gain, delay)
     A, B, C = open_loop(loop_model(DRIVES[:1], loop, np.eye(1)[None], X[None]))
     system = control.ss(A[0], B, -C[0], np.zeros((1, 1)), T)
     found = margins(DRIVES[:1], loop, np.eye(1), X)
     gain_margin, phase_margin, _, _, crossing, _ = control.stability_margins(
-        control.FRD(system, np.geomspace(1.0, np.pi / T * 0.9999, 800), smooth=True)
+        control.FRD(system, np.geomspace(1.0, np.pi / T * 0.9999, 400), smooth=True)
     )
     assert_allclose(found.gain, gain_margin, rtol=1e-4)
     assert_allclose(np.rad2deg(found.phase), phase_margin, rtol=1e-4)
     assert_allclose(found.delay, np.deg2rad(phase_margin) / crossing, rtol=1e-3)
-    omega = np.geomspace(0.1, np.pi / T * 0.999999, 200_000)
+    omega = np.geomspace(0.1, np.pi / T * 0.999999, 50_000)
     assert_allclose(found.sensitivity, np.abs(1.0 / (1.0 + system(np.exp(1j * omega * T)))).max(), rtol=1e-6)
 
 
 @given(
     st.lists(st.floats(0.003, 0.04), min_size=6, max_size=6), st.lists(st.floats(0.5, 2.0), min_size=6, max_size=6),
-    st.floats(5.0, 60.0), st.floats(0.0, 100.0), st.sampled_from(list(FORMS)), st.integers(0, 3),
+    st.floats(5.0, 60.0), st.floats(0.0, 100.0), st.sampled_from(list(FORMS)), st.integers(0, 6),
     st.integers(0, 12), st.floats(0.0, 60.0),
 )  # fmt: skip
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_gain_margin_is_where_a_pole_leaves(taus, gains, kp, kc, form, delay, direction, orientation):
     """The common gain of all drives grows, by bisection, until a pole of the closed loop leaves."""
     drives = tuple(FirstOrderLag(tau, gain) for tau, gain in zip(taus, gains, strict=True))
@@ -285,6 +284,36 @@ def test_where_there_is_no_loop_there_is_no_end():
     assert largest_stable_position_gain(IdealDrive(), Control(T)) == np.inf
 
 
+@pytest.mark.parametrize("delay", [0, 3])
+@pytest.mark.parametrize("form", FORMS)
+def test_what_a_gain_may_grow_by_is_found_without_poles_too(form, delay, monkeypatch):
+    """Poles and frequency response agree; the latter decides where delays are long."""
+    loop = Control(T, 20.0, delay, None, pid(100.0, form))
+    by_poles = largest_stable_coupling(DRIVES, loop, AT, PLANE)
+    gain_by_poles = largest_stable_position_gain(DRIVES[0], loop)
+    monkeypatch.setattr(stability, "MOST_STATES", 0)
+    assert_allclose(largest_stable_coupling(DRIVES, loop, AT, PLANE), by_poles, rtol=3e-5)
+    assert_allclose(largest_stable_position_gain(DRIVES[0], loop), gain_by_poles, rtol=3e-5)
+    for share, turn in ((0.999, 0.0), (1.001, 0.0), (0.1, 3000.0)):
+        edge = replace(pid(share * by_poles, form), orientation=turn)
+        edge = replace(loop, cross_coupling=edge)
+        if share < 1.0 and not turn:
+            check_poses(DRIVES, edge, AT, PLANE)
+        else:
+            with pytest.raises(InfeasibleError, match="orientation" if turn else "across"):
+                check_poses(DRIVES, edge, AT, PLANE)
+
+
+def test_a_very_long_delay_is_judged_in_the_time_of_a_short_one():
+    """The drive is an integrator to it, and the delay d T leaves a gain of pi/2 / (d T + tau + T/2)."""
+    loop = Control(T, 1.0, 500, None, CrossCoupling(0.1))
+    check_stability(axes(*DRIVES[:3]), loop)
+    law = 0.5 * np.pi / (500 * T + TAU[0] + 0.5 * T) / GAIN[0]
+    assert_allclose(largest_stable_position_gain(DRIVES[0], loop), law, rtol=2e-3)
+    with pytest.raises(InfeasibleError, match="across the path"):
+        check_stability(axes(*DRIVES[:3]), replace(loop, cross_coupling=CrossCoupling(2.1)))
+
+
 # --- refusals -------------------------------------------------------------------------------------
 
 
@@ -318,6 +347,11 @@ def test_axes_may_stand_in_any_order_and_some_may_be_missing():
             Control(T, 99.0, 1, None, CrossCoupling(690.0), joint_gains=(20.0, 5.0, 10.0)),
         )
     assert str(refused.value) == str(again.value)
+
+
+def test_joints_that_are_no_axes_are_told_as_joints():
+    with pytest.raises(InfeasibleError, match="the loop of joint q2 is unstable"):
+        check_stability([Axis("q1", LIMITS), Axis("q2", LIMITS, DRIVES[0])], Control(T, 3000.0))
 
 
 def test_every_joint_is_held_by_its_own_gain():

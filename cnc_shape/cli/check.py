@@ -18,11 +18,21 @@ MACHINE_SUFFIXES = (".yaml", ".yml")
 
 def check(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE…", help="G-code, CSV or machine files; - for stdin.")
-    ],
+        list[str] | None,
+        typer.Argument(
+            metavar="FILE…", help="G-code, CSV or machine files; - for stdin.", show_default=False
+        ),
+    ] = None,
     machine: Annotated[
         str | None,
         typer.Option("-m", "--machine", envvar="CNC_SHAPE_MACHINE", help="Machine file with the tool table."),
+    ] = None,
+    jacobian: Annotated[
+        bool, typer.Option("--jacobian", help="Print the machine's Jacobian, by every formula it has.")
+    ] = False,
+    pose: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z…", help="Where to: axes in mm and degrees.", show_default="home"),
     ] = None,
     points: Annotated[
         str | None, typer.Option(metavar="OUT.npz", help="Write the programmed moves of one file as arrays.")
@@ -47,8 +57,16 @@ def check(
     from cnc_shape.cli.output import print_json
     from cnc_shape.cli.progress import progress
     from cnc_shape.cli.reading import limited, named_options
-    from cnc_shape.errors import CncShapeError
+    from cnc_shape.errors import CncShapeError, OptionError
 
+    if jacobian:
+        from cnc_shape.cli.jacobian import show_jacobian
+
+        show_jacobian(machine, files or [], pose, json=json)
+        return DONE
+    if not files or pose is not None:
+        reason = "check needs a FILE" if not files else "--pose goes with --jacobian"
+        raise OptionError(reason, hint="name programs, CSV or machine files; or -m MACHINE --jacobian")
     tools = _tools(machine)
     options = limited(
         named_options(dialect, path, tools, block_delete=block_delete, closed=closed),
@@ -189,8 +207,14 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
     if result["dialect"] == "machine":
         modes = ", ".join(f"{axis.upper()} {count}" for axis, count in result["modes"].items())
         shapers = ", ".join(f"{axis.upper()} {entry['type']}" for axis, entry in result["shapers"].items())
+        kinds: dict[str, list[str]] = {}
+        for joint, drive in result["joints"].items():
+            kinds.setdefault(drive, []).append(joint)
+        joints = ", ".join(f"{' '.join(names)} {drive}" for drive, names in kinds.items())
         return [
             ("machine", result["name"]),
+            ("kinematics", result["kinematics"]),
+            ("joints", joints),
             ("modes", modes or "none"),
             ("shapers", shapers or "none"),
             ("loop", _loop(result["loop"])),

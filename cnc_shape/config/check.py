@@ -9,6 +9,10 @@ from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.machine_file import read_content, read_machine
 from cnc_shape.config.yaml_tree import refuse
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.joints import joints_of
+from cnc_shape.machine import FirstOrderLag, IdealDrive
+
+DRIVES = {IdealDrive: "ideal", FirstOrderLag: "first_order_lag"}
 
 
 def check_machine(path: Path | str) -> dict[str, object]:
@@ -23,6 +27,7 @@ def check_machine(path: Path | str) -> dict[str, object]:
     """
     source, data = read_content(path)
     setup, notes, tree = read_machine(data, source)
+    joints = joints_of(setup.machine, setup.kinematics)
     try:
         loop = check_loop(setup)
     except InfeasibleError as error:
@@ -31,6 +36,8 @@ def check_machine(path: Path | str) -> dict[str, object]:
         "file": source,
         "dialect": "machine",
         "name": setup.machine.name,
+        "kinematics": setup.kinematics.name,
+        "joints": {drive.name: DRIVES[type(drive.drive)] for drive in joints.drives},
         "axes": [axis.name for axis in setup.machine.axes],
         "modes": {axis.name: len(axis.modes) for axis in setup.machine.axes},
         "shapers": {

@@ -6,6 +6,7 @@ begins, or no motion has a beginning.
 
 from __future__ import annotations
 
+from math import nan
 from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
@@ -214,11 +215,9 @@ def _linear_delta(model: LinearDeltaModel) -> Kinematics:
 
 
 def _rails(model: CubicParallelModel) -> Rails:
-    offset, length = frozen(model.tool_offset_mm), model.link_length_mm
+    offset, length = frozen(model.tool_offset_mm), model.link_length_mm or nan
     if model.rails is None:
-        assert model.half_width_mm is not None
-        assert length is not None
-        return cubic_rails(model.half_width_mm, length, offset)
+        return cubic_rails(model.half_width_mm or nan, length, offset)
     direction = np.array([rail.direction for rail in model.rails])
     return Rails(
         frozen(direction / np.linalg.norm(direction, axis=1)[:, None]),

@@ -88,7 +88,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     except ValidationError as error:
         raise complaint(source, tree, error) from None
     axes = _axis_models(model.axes)
-    choice, kinematics = read_kinematics(model)
+    kind, kinematics = read_kinematics(model)
     machine = Machine(
         name=_name(model, source, tree),
         axes=tuple(_axis(source, tree, name, axis) for name, axis in axes.items()),
@@ -105,7 +105,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
         tools=_tools(source, tree, model),
         choices=choices,
         shapers={name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()},
-        kinematics_choice=choice,
+        kinematics_choice=kind,
         kinematics=kinematics,
         warnings=tuple(f"{source}:{note.line}: warning: {note.message}" for note in notes),
         source=source,

@@ -55,6 +55,12 @@ class LoopModel:
     def __len__(self) -> int:
         return len(self.across)
 
+    @property
+    def states(self) -> int:
+        """Of the closed loop."""
+        remembered = 3 * (self.coupling.integral != 0.0) + 3 * (self.coupling.derivative != 0.0)
+        return (2 + self.delay_samples) * self.gains.size + remembered
+
 
 def loop_model(
     drives: Sequence[Drive], control: Control, inverse_jacobians: FloatArray, tangents: FloatArray
@@ -109,8 +115,7 @@ def open_loop(model: LoopModel) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
     rows, joints, late = len(model), model.gains.size, model.delay_samples
     coupling, period = model.coupling, model.sample_time
-    remembered = 3 * (coupling.integral != 0.0) + 3 * (coupling.derivative != 0.0)
-    size = 2 * joints + remembered + late * joints
+    size = model.states
     A, B, told = np.zeros((rows, size, size)), np.zeros((size, joints)), np.zeros((rows, joints, size))
     j = np.arange(joints)
     for row in range(2):
@@ -198,6 +203,26 @@ def with_coupling(model: LoopModel, factor: float) -> LoopModel:
         derivative=factor * coupling.derivative,
     )
     return replace(model, coupling=grown)
+
+
+def joint_of(model: LoopModel, joint: int, gain: float) -> LoopModel:
+    """Return the loop of one joint by itself, under a position gain in 1/s."""
+    return replace(
+        model,
+        coupling=CrossCoupling(0.0),
+        gains=np.array([gain]),
+        drives=model.drives[joint : joint + 1],
+        held=model.held[joint : joint + 1],
+        across=np.zeros((1, 3, 1)),
+        back=np.zeros((1, 1, 3)),
+        turn=np.zeros((1, 1, 1)),
+        reach=np.zeros((1, 3, 3)),
+    )
+
+
+def without_turn(model: LoopModel) -> LoopModel:
+    """Return the model without the orientation term."""
+    return replace(model, turn=np.zeros_like(model.turn))
 
 
 def rows_of(model: LoopModel, rows: NDArray[np.intp]) -> LoopModel:

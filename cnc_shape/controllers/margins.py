@@ -16,16 +16,20 @@ from numpy.typing import NDArray
 
 from cnc_shape.arrays import BoolArray, FloatArray
 from cnc_shape.controllers.control import Control
-from cnc_shape.controllers.loop_model import LoopModel, loop_model, loop_transfer
+from cnc_shape.controllers.loop_model import LoopModel, loop_model, loop_transfer, rows_of
 from cnc_shape.machine import Drive
 
 GRID = 160  # frequencies, evenly on a logarithmic scale up to half the sample rate
+PER_DELAY = 10  # frequencies more for each sample of delay, evenly: each turns the curves by half a circle
 SLOWEST = 1e-2  # of the highest position gain: where the grid begins
-REFINED = 5  # times, each by REFINEMENT
+REFINED = 6  # times, each by REFINEMENT
 REFINEMENT = 8
-NEAR = 1e-3  # - and rad: eigenvalues this near to a crossing cross there
+NEAR = 2e-5  # - and rad: eigenvalues this near to a crossing cross there
 
-Eigenvalues = NDArray[np.complex128]
+NOTHING = 1e-9  # -, eigenvalues below are none
+
+Eigenvalues = NDArray[np.complex128]  # (f,j)
+Loci = Callable[[FloatArray], Eigenvalues]  # of frequencies (f,), rad/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,78 +56,119 @@ def worst_margins(
     drives: Sequence[Drive], control: Control, inverse_jacobian: FloatArray, tangents: FloatArray
 ) -> Margins:
     """Smallest margins of a stable loop at a pose (c,c) over tangents (t,3), and largest sensitivity."""
-    found = NO_LOOP
-    for tangent in tangents:
-        model = loop_model(drives, control, inverse_jacobian[None], tangent[None])
-        if not model.gains.size:
-            return NO_LOOP
-        here = _margins(model)
-        found = Margins(
-            min(found.gain, here.gain),
-            min(found.phase, here.phase),
-            max(found.sensitivity, here.sensitivity),
-            min(found.delay, here.delay),
-        )
-    return found
+    count = len(tangents)
+    model = loop_model(drives, control, np.repeat(inverse_jacobian[None], count, axis=0), tangents)
+    if not model.gains.size:
+        return NO_LOOP
+    found = [_margins(rows_of(model, np.array([row]))) for row in range(count)]
+    return Margins(
+        min(one.gain for one in found),
+        min(one.phase for one in found),
+        max(one.sensitivity for one in found),
+        min(one.delay for one in found),
+    )
+
+
+def largest_factors(base: LoopModel, whole: LoopModel) -> FloatArray:
+    """Factors by which what `whole` has more than `base` may grow before a pole leaves the unit circle, (n,).
+
+    Both are the same loop at the same n pairs of pose and tangent; `base` is stable, or has no gain at all.
+    Infinite where there is no end. The poles themselves are never computed: long delays are no burden.
+    """
+    grid = _grid(whole)
+    identity = np.eye(whole.gains.size)
+
+    def factor(row: int) -> float:
+        rows = np.array([row])
+        less, more = rows_of(base, rows), rows_of(whole, rows)
+
+        def loci(frequencies: FloatArray) -> Eigenvalues:
+            z = np.exp(1j * whole.sample_time * frequencies)
+            held = loop_transfer(less, z)[0]
+            other = loop_transfer(more, z)[0] - held
+            return _eigenvalues(np.asarray(np.linalg.inv(identity + held), np.complex128) @ other)
+
+        largest = _opposed(loci, grid, loci(grid))[1].max(initial=0.0)
+        return 1.0 / largest if largest > NOTHING else np.inf
+
+    return np.array([factor(row) for row in range(len(whole))])
 
 
 def _margins(model: LoopModel) -> Margins:
+    grid = _grid(model)
+
+    def loci(frequencies: FloatArray) -> Eigenvalues:
+        return _eigenvalues(loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0])
+
+    curves = loci(grid)
+    opposed, sizes = _opposed(loci, grid, curves)
+    turned = _crossings(loci, grid, curves, _over_unit_circle)
+    here = loci(turned)
+    circled = np.abs(np.abs(here) - 1.0) < NEAR
+    angle = np.angle(-here[circled])
+    delay = np.mod(angle, 2.0 * np.pi) / np.broadcast_to(turned[:, None], here.shape)[circled]
+    return Margins(
+        float((1.0 / sizes[sizes < 1.0]).min(initial=np.inf)),
+        float(np.abs(angle).min(initial=np.inf)),
+        _sensitivity(model, np.sort(np.concatenate([grid, opposed, turned]))),
+        float(delay.min(initial=np.inf)),
+    )
+
+
+def _grid(model: LoopModel) -> FloatArray:
+    """Frequencies up to half the sample rate, rad/s, so dense that the curves turn little between them."""
     end = np.pi / model.sample_time
     slowest = SLOWEST * min(float(model.gains.max()) or end, end)
-    grid = np.geomspace(slowest, end * (1.0 - 1e-9), GRID)
-    loci = _loci(model, grid)
-    # at half the sample rate the loop is real: a curve may end on the negative axis without crossing it
-    last = _loci_at(model, np.array([-1.0 + 0.0j]))[0]
-    gains, phases, delays = [np.inf], [np.inf], [np.inf]
-    gains.extend((-1.0 / last.real[(last.real < 0.0) & (last.real > -1.0)]).tolist())
-    opposed = _crossings(model, grid, loci, _over_negative_axis)
-    for frequency in opposed:
-        here = _loci(model, np.array([frequency]))[0]
-        size = np.abs(here)[np.abs(np.angle(-here)) < NEAR]
-        gains.extend((1.0 / size[size < 1.0]).tolist())
-    turned = _crossings(model, grid, loci, _over_unit_circle)
-    for frequency in turned:
-        here = _loci(model, np.array([frequency]))[0]
-        angle = np.angle(-here)[np.abs(np.abs(here) - 1.0) < NEAR]
-        phases.extend(np.abs(angle).tolist())
-        delays.extend((np.mod(angle, 2.0 * np.pi) / frequency).tolist())
-    watched = np.sort(np.concatenate([grid, opposed, turned]))
-    return Margins(min(gains), min(phases), _sensitivity(model, watched), min(delays))
+    even = np.linspace(0.0, end, PER_DELAY * model.delay_samples + 2)[1:]
+    grid = np.union1d(np.geomspace(slowest, end, GRID), even)
+    grid[-1] = end * (1.0 - 1e-9)
+    return grid
 
 
-def _loci(model: LoopModel, frequencies: FloatArray) -> Eigenvalues:
-    """Eigenvalues of L at frequencies (f,) rad/s, (f,j)."""
-    return _loci_at(model, np.exp(1j * model.sample_time * frequencies))
+def _eigenvalues(transfer: NDArray[np.complex128]) -> Eigenvalues:
+    """Eigenvalues (f,j) of matrices (f,j,j); those that are but round-off become NOTHING."""
+    found = np.asarray(np.linalg.eigvals(transfer), dtype=np.complex128)
+    return np.where(np.abs(found) < NOTHING, NOTHING, found)
 
 
-def _loci_at(model: LoopModel, z: NDArray[np.complex128]) -> Eigenvalues:
-    return np.asarray(np.linalg.eigvals(loop_transfer(model, z)[0]), dtype=np.complex128)
+def _opposed(loci: Loci, grid: FloatArray, curves: Eigenvalues) -> tuple[FloatArray, FloatArray]:
+    """Frequencies at which eigenvalues pass the negative real axis, and their sizes there.
+
+    At half the sample rate all curves are real: they may end on the negative axis without passing it.
+    """
+    frequencies = _crossings(loci, grid, curves, _over_negative_axis)
+    here = np.concatenate([curves[-1:], loci(frequencies)])
+    return frequencies, np.abs(here[np.abs(np.angle(-here)) < NEAR])
 
 
 def _crossings(
-    model: LoopModel, grid: FloatArray, loci: Eigenvalues, over: Callable[[Eigenvalues], BoolArray]
-) -> list[float]:
+    loci: Loci, grid: FloatArray, curves: Eigenvalues, over: Callable[[Eigenvalues], BoolArray]
+) -> FloatArray:
     """Frequencies at which an eigenvalue passes `over` a line, rad/s."""
-    brackets = [grid[i : i + 2] for i in np.flatnonzero(over(loci))]
-    for _ in range(REFINED):
-        finer: list[FloatArray] = [np.linspace(low, high, REFINEMENT + 1) for low, high in brackets]
-        brackets = [inner[i : i + 2] for inner in finer for i in np.flatnonzero(over(_loci(model, inner)))]
-    return [float(bracket.mean()) for bracket in brackets]
+    passed = np.flatnonzero(over(curves))
+    low, high = grid[passed], grid[passed + 1]
+    share = np.linspace(0.0, 1.0, REFINEMENT + 1)
+    for _ in range(REFINED if passed.size else 0):
+        finer = (low[:, None] + share * (high - low)[:, None]).ravel()
+        passed = np.flatnonzero(over(loci(finer)))
+        passed = passed[(passed + 1) % share.size != 0]  # not from one bracket to the next
+        low, high = finer[passed], finer[passed + 1]
+    return 0.5 * (low + high)
 
 
-def _over_unit_circle(loci: Eigenvalues) -> BoolArray:
+def _over_unit_circle(curves: Eigenvalues) -> BoolArray:
     """Steps of the grid (f-1,) in which an eigenvalue passes the unit circle: sorted sizes are continuous."""
-    outside = np.sort(np.abs(loci), axis=1) > 1.0
+    outside = np.sort(np.abs(curves), axis=1) > 1.0
     return (outside[1:] != outside[:-1]).any(axis=1)
 
 
-def _over_negative_axis(loci: Eigenvalues) -> BoolArray:
+def _over_negative_axis(curves: Eigenvalues) -> BoolArray:
     """Steps of the grid (f-1,) in which an eigenvalue passes the negative real axis.
 
     Sorted angles are continuous around the circle but for one eigenvalue passing the cut, which shifts all
     by one place: the shift at which they move least is the one that took place.
     """
-    angle = np.sort(np.angle(-loci), axis=1)  # 0 on the negative axis, the cut on the positive one
+    angle = np.sort(np.angle(-curves), axis=1)  # 0 on the negative axis, the cut on the positive one
     before, after = angle[:-1], angle[1:]
     shifts = np.stack([np.roll(after, shift, axis=1) for shift in range(angle.shape[1])])
     moved = np.mod(shifts - before + np.pi, 2.0 * np.pi) - np.pi

@@ -18,15 +18,20 @@ from cnc_shape.controllers.cross_coupling import CrossCoupling
 from cnc_shape.controllers.loop_model import (
     UNBOUNDED,
     LoopModel,
+    joint_of,
     loop_model,
     pole_radius,
     rows_of,
     with_coupling,
+    without_turn,
 )
+from cnc_shape.controllers.margins import largest_factors
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import Axis, Drive, FirstOrderLag
+from cnc_shape.program import ROTARY
 
 GAIN_RESOLUTION = 1e-5  # -, of the largest stable gain that is told
+MOST_STATES = 120  # of a loop whose poles are computed
 GROWTH = 1.5  # -, of the gain from one look to the next, upwards
 MOST_GROWTH = 1e6  # -, beyond which a gain has no end
 LINEAR = ("x", "y", "z")
@@ -61,7 +66,8 @@ def check_stability(axes: Sequence[Axis], control: Control) -> None:
         Names what is unstable, its gain and the largest stable one.
     """
     axes, control = cartesian_loop(axes, control)
-    names, drives = [f"axis {axis.name}" for axis in axes], [axis.drive for axis in axes]
+    names = [f"{'axis' if axis.name in (*LINEAR, *ROTARY) else 'joint'} {axis.name}" for axis in axes]
+    drives = [axis.drive for axis in axes]
     _check(names, drives, control, *_everywhere(np.eye(len(drives))[None], DIRECTIONS), _nowhere)
 
 
@@ -116,8 +122,7 @@ def largest_stable_position_gain(drive: Drive, control: Control) -> float:
     """Largest position gain with which a joint is stable by itself, 1/s; infinite for an ideal drive."""
     if not isinstance(drive, FirstOrderLag):
         return np.inf
-    unit = 1.0 / control.sample_time
-    return unit * _largest_factor(lambda factor: _joint_radius(drive, control, unit * factor) < 1.0)
+    return _largest_gain(loop_model((drive,), control, np.zeros((0, 1, 1)), np.zeros((0, 3))), 0)
 
 
 def cartesian_loop(axes: Sequence[Axis], control: Control) -> tuple[tuple[Axis, ...], Control]:
@@ -144,41 +149,50 @@ def _check(
     place: Place,
 ) -> None:
     """Refuse an unstable loop at n pairs of pose (n,c,c) and tangent (n,3)."""
-    gains = control.joint_gains or (control.position_gain,) * len(drives)
-    for name, drive, gain in zip(names, drives, gains, strict=True):
-        if isinstance(drive, FirstOrderLag) and _joint_radius(drive, control, gain) >= 1.0:
-            largest = largest_stable_position_gain(drive, control)
+    alike = len(set(drives)) == 1 and len(set(control.joint_gains)) < 2
+    if alike:  # across the path the loop is one joint's under Kp + Kc, whatever the pose
+        inverse_jacobians, tangents = inverse_jacobians[:1], tangents[:1]
+    model = loop_model(drives, control, inverse_jacobians, tangents)
+    lagging = [name for name, drive in zip(names, drives, strict=True) if isinstance(drive, FirstOrderLag)]
+    for joint, name in enumerate(lagging):
+        gain = float(model.gains[joint])
+        if not _stable_joint(model, joint, gain):
+            largest = _largest_gain(model, joint)
             raise InfeasibleError(
                 f"the loop of {name} is unstable: position gain {gain:g} 1/s, stable below {largest:.4g} 1/s",
                 hint=HINT,
             )
     coupling = control.cross_coupling
-    if coupling is None or not len(tangents):
+    if coupling is None or not lagging:
         return
-    alike = _alike(drives, gains)
-    if alike:
-        inverse_jacobians, tangents = inverse_jacobians[:1], tangents[:1]
-    model = loop_model(drives, control, inverse_jacobians, tangents)
-    radius = pole_radius(model)
-    if radius.max() < 1.0:
+    held = with_coupling(model, 0.0)
+    if coupling.orientation:
+        _check_turn(held, _nowhere if alike else place)
+    reserve = _reserve(held, model)
+    if reserve.min(initial=1.0) > 0.0:
         return
-    turning = pole_radius(with_coupling(model, 0.0))
-    if turning.max() >= 1.0:
-        raise InfeasibleError(
-            f"the loop of the orientation is unstable{_told(place(int(turning.argmax())))}: gain "
-            f"{coupling.orientation:g} 1/s besides the position gain",
-            hint="lower cross_coupling.orientation_per_s",
-        )
     largest = coupling.proportional * _largest_coupling(model)
-    worst = int(radius.argmax())
+    worst = int(reserve.argmin())
     where = "" if alike else f"{_told(place(worst))}, moving along {_direction(tangents[worst])}"
-    share = (
-        " with its integral and derivative" if model.coupling.integral or model.coupling.derivative else ""
-    )
+    pid = model.coupling.integral or model.coupling.derivative
+    share = " with its integral and derivative" if pid else ""
     raise InfeasibleError(
         f"the loop is unstable across the path{where}: cross-coupling gain {coupling.proportional:g} 1/s"
         f"{share}, stable below {largest:.4g} 1/s",
         hint=HINT,
+    )
+
+
+def _check_turn(held: LoopModel, place: Place) -> None:
+    """Refuse a loop that its orientation term makes unstable before anything acts across the path."""
+    reserve = _reserve(without_turn(held), held)
+    if reserve.min(initial=1.0) > 0.0:
+        return
+    gain = held.coupling.orientation
+    raise InfeasibleError(
+        f"the loop of the orientation is unstable{_told(place(int(reserve.argmin())))}: gain {gain:g} 1/s "
+        "besides the position gain",
+        hint="lower cross_coupling.orientation_per_s",
     )
 
 
@@ -192,18 +206,33 @@ def _everywhere(inverse_jacobians: FloatArray, tangents: FloatArray) -> tuple[Fl
     return np.repeat(inverse_jacobians, directions, axis=0), np.tile(tangents, (poses, 1))
 
 
-def _alike(drives: Sequence[Drive], gains: Sequence[float]) -> bool:
-    """Whether all joints answer alike: then the loop across the path is one joint's, whatever the pose."""
-    return len(set(drives)) == 1 and len(set(gains)) == 1
+def _stable_joint(model: LoopModel, joint: int, gain: float) -> bool:
+    return bool(_reserve(joint_of(model, joint, 0.0), joint_of(model, joint, gain))[0] > 0.0)
 
 
-def _joint_radius(drive: Drive, control: Control, gain: float) -> float:
-    alone = replace(control, cross_coupling=None, joint_gains=(gain,))
-    return float(pole_radius(loop_model((drive,), alone, np.ones((1, 1, 1)), np.zeros((1, 3))))[0])
+def _largest_gain(model: LoopModel, joint: int) -> float:
+    """Largest position gain with which a joint is stable by itself, 1/s."""
+    unit = 1.0 / model.sample_time
+    whole = joint_of(model, joint, unit)
+    if whole.states > MOST_STATES:
+        return unit * float(largest_factors(joint_of(model, joint, 0.0), whole)[0])
+    return unit * _largest_factor(lambda factor: _stable_joint(model, joint, unit * factor))
+
+
+def _reserve(base: LoopModel, whole: LoopModel) -> FloatArray:
+    """What a loop has left before it is unstable, (n,): positive if stable, given that `base` is.
+
+    By the poles; by the frequency response where delays make too many of them.
+    """
+    if whole.states <= MOST_STATES:
+        return 1.0 - pole_radius(whole)
+    return largest_factors(base, whole) - 1.0
 
 
 def _largest_coupling(model: LoopModel) -> float:
     """Factor by which the gains across the path may grow before any row becomes unstable."""
+    if model.states > MOST_STATES:
+        return float(largest_factors(with_coupling(model, 0.0), model).min(initial=np.inf))
     suspects = model
 
     def stable(factor: float) -> bool:

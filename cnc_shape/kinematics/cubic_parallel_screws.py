@@ -73,9 +73,9 @@ def _passive(d: FloatArray, slider: FloatArray, end: FloatArray) -> FloatArray:
     The first axis of the universal joint is fixed on the slider, square to its rail; which one does not
     matter to the platform.
     """
-    first: FloatArray = np.cross(d, np.eye(3)[np.argmin(np.abs(d))])
-    second: FloatArray = np.cross(first, end - slider)
-    axes: FloatArray = np.vstack([first / np.linalg.norm(first), second / np.linalg.norm(second), np.eye(3)])
-    through: FloatArray = np.vstack([slider, slider, end, end, end])
-    moments: FloatArray = np.cross(through, axes)
-    return np.hstack([moments, axes]).T
+    least_along: FloatArray = np.eye(3)[np.argmin(np.abs(d))]
+    first = np.cross(d, least_along)
+    second = np.cross(first, end - slider)
+    axes = np.vstack([first / np.linalg.norm(first), second / np.linalg.norm(second), np.eye(3)])
+    through = np.vstack([slider, slider, end, end, end])
+    return np.hstack([np.cross(through, axes), axes]).T
