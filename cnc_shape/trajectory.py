@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -21,7 +21,8 @@ class Trajectory:
     """A chunk of samples of the axis commands, analytic in position, velocity and acceleration.
 
     The first sample of a motion is at t = 0; the last is the first at or after its end, at rest. A replayed
-    command was given by its positions alone: its velocity and acceleration are differences of them.
+    command was given by its positions alone: its velocity and acceleration are differences of them. Once it is
+    shaped it is a sum of interpolants, which know their velocity, and no replayed one any more.
     """
 
     axes: tuple[str, ...]
@@ -30,7 +31,7 @@ class Trajectory:
     position: FloatArray  # (n,d) mm or rad
     velocity: FloatArray  # (n,d) mm/s or rad/s
     acceleration: FloatArray  # (n,d) mm/s^2 or rad/s^2
-    replayed: bool = False
+    replayed: bool = field(default=False, kw_only=True)  # positions are all that was given
 
     def __len__(self) -> int:
         return self.arc_length.size
@@ -44,7 +45,7 @@ class Trajectory:
             self.position[rows],
             self.velocity[rows],
             self.acceleration[rows],
-            self.replayed,
+            replayed=self.replayed,
         )
 
     def resting(self, row: int, samples: int) -> Trajectory:
@@ -53,7 +54,7 @@ class Trajectory:
         still = frozen(np.zeros((samples, position.size)))
         place = frozen(np.full(samples, self.arc_length[row]))
         return Trajectory(
-            self.axes, self.sample_time, place, frozen(still + position), still, still, self.replayed
+            self.axes, self.sample_time, place, frozen(still + position), still, still, replayed=self.replayed
         )
 
     def late_arc_length(self, first: int, delay: float) -> FloatArray:
@@ -139,7 +140,7 @@ def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
         frozen(np.concatenate([part.position for part in parts])),
         frozen(np.concatenate([part.velocity for part in parts])),
         frozen(np.concatenate([part.acceleration for part in parts])),
-        parts[-1].replayed,
+        replayed=parts[-1].replayed,
     )
 
 

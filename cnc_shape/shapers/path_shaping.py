@@ -72,7 +72,7 @@ def path_sampling(shaper: Shaper, sample_time: float) -> PathSamplingStep:
         law = replace(profile, path=_parameter(profile.path, start[start.size - len(profile.path) :]))
         for (sampled, travel), end_of_chunk in with_last(draw(now.sampled, law, last)):
             shaped, travel = shape(now.shaped, travel, last and end_of_chunk)
-            place, position, velocity, acceleration = along_path(
+            place, *signals = along_path(
                 travel.position[:, 0], travel.velocity[:, 0], travel.acceleration[:, 0],
                 start, path.length, path.coefficients, path.arc_length, path.stretch,
             )  # fmt: skip
@@ -81,17 +81,7 @@ def path_sampling(shaper: Shaper, sample_time: float) -> PathSamplingStep:
                 sampled, shaped, path.cut(slice(keep, None)), start[keep:], end,
                 sampled.end_time + shaper.duration,
             )  # fmt: skip
-            yield (
-                now,
-                Trajectory(
-                    path.axes,
-                    sample_time,
-                    frozen(place),
-                    frozen(position),
-                    frozen(velocity),
-                    frozen(acceleration),
-                ),
-            )
+            yield now, Trajectory(path.axes, sample_time, frozen(place), *map(frozen, signals))
 
     return step
 

@@ -88,9 +88,9 @@ def shaping(
             placed.whole, placed.share, placed.amplitude, placed.impulses, sample_time,
         )  # fmt: skip
         place = whole.late_arc_length(first, placed.common / sample_time)
-        signals = (frozen(signal) for signal in shaped)
-        return whole.cut(slice(len(whole) - kept, None)), Trajectory(
-            command.axes, sample_time, frozen(place), *signals, replayed=command.replayed
+        return (
+            whole.cut(slice(len(whole) - kept, None)),
+            Trajectory(command.axes, sample_time, frozen(place), *(frozen(signal) for signal in shaped)),
         )
 
     return step
