@@ -21,8 +21,8 @@ class Trajectory:
     """A chunk of samples of the axis commands, analytic in position, velocity and acceleration.
 
     The first sample of a motion is at t = 0; the last is the first at or after its end, at rest. A replayed
-    command was given by its positions alone: its velocity and acceleration are differences of them. Once it is
-    shaped it is a sum of interpolants, which know their velocity, and no replayed one any more.
+    command was given by its positions alone: velocity and acceleration are differences of them. Once shaped
+    it is a sum of interpolants, which know their velocity, and replayed no more.
     """
 
     axes: tuple[str, ...]

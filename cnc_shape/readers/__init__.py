@@ -23,9 +23,9 @@ from cnc_shape.readers.source import (
     open_source,
 )
 from cnc_shape.readers.table import TIME, is_table, read_header
-from cnc_shape.readers.timed import TimedPath, TimedPoints, read_timed_points, timed_polyline
-from cnc_shape.readers.timed_circle import timed_circle
-from cnc_shape.readers.timed_spline import timed_spline
+from cnc_shape.readers.timed import TimedPath, TimedPoints, polyline_through, read_timed_points
+from cnc_shape.readers.timed_circle import circle_through
+from cnc_shape.readers.timed_spline import spline_through
 from cnc_shape.readers.waypoints import read_waypoints
 
 if TYPE_CHECKING:
@@ -75,9 +75,9 @@ class _Through(Protocol):
 
 
 PATHS: dict[Curve, _Through] = {
-    Curve.POLYLINE: timed_polyline,
-    Curve.SPLINE: timed_spline,
-    Curve.CIRCLE: timed_circle,
+    Curve.POLYLINE: polyline_through,
+    Curve.SPLINE: spline_through,
+    Curve.CIRCLE: circle_through,
 }
 Reader = Callable[[Source, ReadingOptions], Reading]
 

@@ -107,7 +107,7 @@ class Spans:
         return (np.arange(1, before.size + 1) - before) / np.repeat(self.pieces, self.pieces)
 
 
-def timed_polyline(points: TimedPoints, *, closed: bool) -> TimedPath:
+def polyline_through(points: TimedPoints, *, closed: bool) -> TimedPath:
     """Straight lines from row to row; rows without travel are dwells. closed: one more leads back."""
     position, line, seconds = points.position, points.line, np.diff(points.time)
     if closed and len(new_points(position[[-1, 0], :3])) > 1:

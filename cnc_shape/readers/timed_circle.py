@@ -44,7 +44,7 @@ class Circle:
         return self.center + self.radius * (cosine * self.along + sine * self.across)
 
 
-def timed_circle(points: TimedPoints, *, closed: bool) -> TimedPath:
+def circle_through(points: TimedPoints, *, closed: bool) -> TimedPath:
     """Arcs of the circle through the rows, one from row to row, with the turns and the sense they have.
 
     closed: one more completes the last turn. Rows that repeat a point are dwells.

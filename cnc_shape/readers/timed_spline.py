@@ -14,7 +14,7 @@ CHORD_ERROR = 1e-6  # mm, of the lines
 MOST_LINES = 2_000_000
 
 
-def timed_spline(points: TimedPoints, *, closed: bool) -> TimedPath:
+def spline_through(points: TimedPoints, *, closed: bool) -> TimedPath:
     """Twice continuously differentiable cubic spline through the rows, over the length of their chords.
 
     Its ends are not-a-knot; a closed one is periodic, and leads back to the first row if the last is
