@@ -17,10 +17,11 @@ import numpy as np
 
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.kernels.path_limits import chord_speeds, path_excesses, straight_along
 from cnc_shape.kernels.sampling import excesses
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.kernels.time_law import backward, forward
-from cnc_shape.limits import Limits
+from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
 from cnc_shape.smoothing import Path, join_paths
 
 PATIENCE = 1024  # cells that gather before a new attempt, so that short chunks do not repeat the scan
@@ -63,11 +64,13 @@ class Violation:
     gap: float  # mm or rad, largest jump of the path parameter between pieces
     jump: float  # mm/s or rad/s, largest jump of the path speed between pieces
     line: int | None  # source line of the largest excess
+    path_acceleration: float = -1.0  # -, the same for the acceleration along the path
+    chord: float = -1.0  # -, the same for the speed at which chords keep their error
 
     @property
     def worst(self) -> float:
         """Largest relative excess over any limit."""
-        return max(self.velocity, self.acceleration, self.feed)
+        return max(self.velocity, self.acceleration, self.feed, self.path_acceleration, self.chord)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,7 +87,9 @@ class PlanningState:
 PlanningStep: TypeAlias = Callable[[PlanningState | None, Path, bool], tuple[PlanningState | None, Profile]]
 
 
-def planning(limits: Sequence[Limits], gentleness: FloatArray | None = None) -> PlanningStep:
+def planning(
+    limits: Sequence[Limits], gentleness: FloatArray | None = None, path_limits: PathLimits = NO_PATH_LIMITS
+) -> PlanningStep:
     """Return the resumable step from Path to Profile: ``step(state, chunk, last) -> (state, profile)``.
 
     Parameters
@@ -93,6 +98,8 @@ def planning(limits: Sequence[Limits], gentleness: FloatArray | None = None) -> 
         One per axis of the path, in the order of `path.axes`. Jerk is not limited.
     gentleness
         One factor in (0, 1] for each cell of the program: of the accelerations, its square root of the feed.
+    path_limits
+        Of the motion along the path.
     """
     velocity = frozen([limit.velocity for limit in limits])
     acceleration = frozen([limit.acceleration for limit in limits])
@@ -106,12 +113,15 @@ def planning(limits: Sequence[Limits], gentleness: FloatArray | None = None) -> 
             waiting = None if last else replace(before, parts=parts)
             return waiting, _no_pieces(path.cut(slice(0, 0)))
         whole = join_paths(parts)
-        asked, feed_rate = _gentle(whole, gentleness, before.passed)
+        asked, feed_rate = _gentle(whole, _feed_rate(whole, path_limits), gentleness, before.passed)
         limit_v2, straight = speed_limits(
             asked, whole.length, feed_rate, rotary_only(whole), velocity, acceleration
         )
+        along = _along(whole, path_limits)
+        if along.size:
+            straight = straight_along(asked, straight, along)
         reach_v2, free = backward(
-            asked, whole.length, whole.stop, limit_v2, straight, acceleration, before.before_v2
+            asked, whole.length, whole.stop, limit_v2, straight, acceleration, along, before.before_v2
         )
         final = len(whole) if last else int(np.flatnonzero(free[:-1])[-1]) if free[:-1].any() else 0
         clock = before.clock.copy()
@@ -124,6 +134,7 @@ def planning(limits: Sequence[Limits], gentleness: FloatArray | None = None) -> 
             limit_v2,
             straight,
             acceleration,
+            along,
             reach_v2,
             clock,
         )
@@ -143,18 +154,18 @@ def planning(limits: Sequence[Limits], gentleness: FloatArray | None = None) -> 
     return step
 
 
-def plan(path: Path, limits: Sequence[Limits]) -> Profile:
+def plan(path: Path, limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS) -> Profile:
     """Plan the fastest motion along a whole path.
 
     Every axis keeps its velocity and acceleration, ``|q'| du/dt`` in XYZ the feed rate (of the rotary axes
-    where they move alone).
+    where they move alone) and the `path_limits`.
 
     Raises
     ------
     InfeasibleError
         A move of an axis without velocity or acceleration, or without feed; names the line.
     """
-    _, profile = planning(limits)(None, path, True)
+    _, profile = planning(limits, None, path_limits)(None, path, True)
     return profile
 
 
@@ -163,7 +174,9 @@ def rotary_only(path: Path) -> IntArray:
     return frozen_integers(path.stretch == 0.0)
 
 
-def worst_violation(profile: Profile, limits: Sequence[Limits], points: int = 9) -> Violation:
+def worst_violation(
+    profile: Profile, limits: Sequence[Limits], points: int = 9, path_limits: PathLimits = NO_PATH_LIMITS
+) -> Violation:
     """Evaluate a time law densely against the limits it promises to keep, and its pieces for gaps.
 
     Parameters
@@ -178,28 +191,47 @@ def worst_violation(profile: Profile, limits: Sequence[Limits], points: int = 9)
         profile.cell, path.coefficients, path.length, path.feed_rate, rotary_only(path), path.stop, bounds,
         points,
     )  # fmt: skip
-    most = int(np.argmax(worst[:3]))
-    line = int(path.line[profile.cell[where[most]]]) if len(profile) else None
-    return Violation(
-        float(worst[0]) - 1.0,
-        float(worst[1]) - 1.0,
-        float(worst[2]) - 1.0,
-        float(worst[3]),
-        float(worst[4]),
-        line,
+    ratios, places = worst[:3], where[:3]
+    if path_limits != NO_PATH_LIMITS:
+        more, more_places = path_excesses(
+            profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk, profile.cell,
+            path.coefficients, rotary_only(path), float(path_limits.acceleration),
+            *(path_limits.chord or (0.0, 0.0)), points,
+        )  # fmt: skip
+        ratios, places = np.append(ratios, more), np.append(places, more_places)
+    line = int(path.line[profile.cell[places[int(np.argmax(ratios))]]]) if len(profile) else None
+    velocity, acceleration, feed, *along = (float(ratio) - 1.0 for ratio in ratios)
+    return Violation(velocity, acceleration, feed, float(worst[3]), float(worst[4]), line, *along)
+
+
+def _feed_rate(path: Path, path_limits: PathLimits) -> FloatArray:
+    """Feed rate of each cell, (k,) mm/s, at which chords keep their error on its tightest curve."""
+    if path_limits.chord is None:
+        return path.feed_rate
+    return frozen(
+        chord_speeds(path.coefficients, path.length, path.feed_rate, rotary_only(path), *path_limits.chord)
     )
 
 
-def _gentle(path: Path, gentleness: FloatArray | None, passed: int) -> tuple[FloatArray, FloatArray]:
+def _along(path: Path, path_limits: PathLimits) -> FloatArray:
+    """Limit of the acceleration along each cell, (k,) mm/s^2; (0,) where there is none."""
+    if np.isinf(path_limits.acceleration):
+        return frozen(np.empty(0))
+    return frozen(np.where(path.stretch == 0.0, np.inf, path_limits.acceleration))
+
+
+def _gentle(
+    path: Path, feed_rate: FloatArray, gentleness: FloatArray | None, passed: int
+) -> tuple[FloatArray, FloatArray]:
     """What the scans plan for: a path whose derivatives, and whose accelerations with them, are larger.
 
     A cell with the factor g is planned as ``q/g`` at the feed ``F/sqrt(g)``: then ``q'' <= g a`` and the
     speed is at most ``sqrt(g) F``.
     """
     if gentleness is None:
-        return path.coefficients, path.feed_rate
+        return path.coefficients, feed_rate
     factor = gentleness[passed : passed + len(path)]
-    return frozen(path.coefficients / factor[:, None, None]), frozen(path.feed_rate / np.sqrt(factor))
+    return frozen(path.coefficients / factor[:, None, None]), frozen(feed_rate / np.sqrt(factor))
 
 
 def _check(path: Path, velocity: FloatArray, acceleration: FloatArray) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from cnc_shape.chunks import with_last
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import PlanningState, Profile, planning
+from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
 from cnc_shape.machine import Machine
 from cnc_shape.program import Program
 from cnc_shape.shapers.path_shaping import path_sampling
@@ -46,6 +47,7 @@ def moving(
     path_tolerance: float,
     sample_time: float,
     timings: Sequence[Timing] = (PLAIN,),
+    path_limits: PathLimits = NO_PATH_LIMITS,
 ) -> Iterator[Block]:
     """Plan and sample a program, chunk by chunk, once for each timing.
 
@@ -61,6 +63,8 @@ def moving(
         s.
     timings
         Distinct; the blocks of the motions come in turns, each motion's in its own order.
+    path_limits
+        Of the motion along the path, beside those of the axes.
 
     Raises
     ------
@@ -75,7 +79,7 @@ def moving(
     for chunk, last in with_last(program):
         if not drives:
             machine = machine.with_axes(chunk.axes)
-            drives = [_Drive(timing, machine, sample_time) for timing in timings]
+            drives = [_Drive(timing, machine, sample_time, path_limits) for timing in timings]
             moved = np.zeros(len(chunk.axes), dtype=np.bool_)
         low, high = check_travel(chunk, {axis.name: axis.limits.travel for axis in machine.axes})
         moved |= np.ptp(np.vstack([chunk.start, low, high]), axis=0) > STILL
@@ -93,10 +97,10 @@ def moving(
 class _Drive:
     """One timing's way along the path that all of them share."""
 
-    def __init__(self, timing: Timing, machine: Machine, sample_time: float) -> None:
+    def __init__(self, timing: Timing, machine: Machine, sample_time: float, path_limits: PathLimits) -> None:
         gentle = None if timing.slowdown is None else timing.slowdown.factor
         self._timing = timing
-        self._plan = planning(tuple(axis.limits for axis in machine.axes), gentle)
+        self._plan = planning(tuple(axis.limits for axis in machine.axes), gentle, path_limits)
         self._draw = drawing(timing, sample_time)
         self._planned: PlanningState | None = None
         self._begun = False

@@ -102,7 +102,8 @@ def open_motion(
             every = tuple(dict.fromkeys((*timings, *watched)))
             chunks = _noted(opened.chunks, motion.notes)
             machine = planner or setup.machine
-            blocks = moving(chunks, machine, setup.planning.path_tolerance, period, every)
+            planning = setup.planning
+            blocks = moving(chunks, machine, planning.path_tolerance, period, every, planning.path_limits)
         motion.blocks = _watched(_within_reach(blocks, setup, opened.source), motion)
         yield motion
 

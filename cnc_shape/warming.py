@@ -24,6 +24,7 @@ from cnc_shape.config.setup import Setup
 from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.kernels import compiled_count
 from cnc_shape.kinematics import cubic_parallel, cubic_rails, first_refusal, linear_delta, trunnion_ac
+from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import run
 from cnc_shape.readers import ReadingOptions, read_program, reading
@@ -148,5 +149,6 @@ def _hold() -> None:
 def _certify(path: Path, setup: Setup) -> None:
     program = read_program(path)
     limits = [axis.limits for axis in setup.machine.with_axes(program.axes).axes]
-    profile = plan(smooth(build_toolpath(program), Smoothing(setup.planning.path_tolerance)), limits)
-    worst_violation(profile, limits)
+    curve = smooth(build_toolpath(program), Smoothing(setup.planning.path_tolerance))
+    for path_limits in (NO_PATH_LIMITS, PathLimits(500.0, 1e-3, 1e-3)):
+        worst_violation(plan(curve, limits, path_limits), limits, path_limits=path_limits)

@@ -330,7 +330,22 @@ def cell_rows(coefficients, h):
     return alpha, beta
 
 
-def fastest(path, limit_v2, acceleration):
+def along_rows(coefficients, h, limit):
+    """Rows ``alpha a + beta x0`` of one cell whose size must stay below 1: the acceleration along the path.
+
+    ``q' . (q' a + q'' (x0 + 2 a s))`` over the limit times t . q', coefficient by coefficient.
+    """
+    first = np.array([coefficients[1], 2.0 * coefficients[2] * h, 3.0 * coefficients[3] * h**2])[:, :3].T
+    second = np.array([2.0 * coefficients[2], 6.0 * coefficients[3] * h])[:, :3].T
+    both = (first[:, 0] + first.sum(axis=1)) / np.linalg.norm(first[:, 0] + first.sum(axis=1))
+    square = sum(np.convolve(row, row) for row in first)
+    product = sum(np.convolve(row, bend) for row, bend in zip(first, second, strict=True))
+    room = limit * bernstein([*(both @ first), 0.0, 0.0])
+    alpha = bernstein(square + 2.0 * h * np.append(0.0, product)) / room
+    return alpha, bernstein(np.append(product, 0.0)) / room
+
+
+def fastest(path, limit_v2, acceleration, along=None):
     """Squared speeds at the nodes by linear programs, one a cell: backward, then forward, from rest."""
     from scipy.optimize import linprog
 
@@ -343,6 +358,10 @@ def fastest(path, limit_v2, acceleration):
         h = path.length[k]
         alpha, beta = cell_rows(path.coefficients[k], h)
         bound = np.tile(acceleration, 3)
+        if along is not None:
+            more = along_rows(path.coefficients[k], h, along)
+            alpha, beta = np.append(alpha, more[0]), np.append(beta, more[1])
+            bound = np.append(bound, np.ones(5))
         left = np.vstack(
             [np.column_stack([alpha, beta]), -np.column_stack([alpha, beta]), [2 * h, 1], [-2 * h, -1]]
         )
@@ -722,3 +741,59 @@ def coupled_tick(drives, control, inverse_jacobian, tangent, state):
         moved[i] = q[i] + be * v[i] + drive.gain * (period - be) * heard[i]
         sped[i] = al * v[i] + (1.0 - al) * drive.gain * heard[i]
     return moved, sped, integral, eps, late
+
+
+# --- limits along the path ----------------------------------------------------------------------------
+
+
+def curvatures(coefficients, s):
+    """Curvature of XYZ at places `s` of a cell."""
+    first = coefficients[1] + np.outer(s, 2 * coefficients[2]) + np.outer(s**2, 3 * coefficients[3])
+    second = 2 * coefficients[2] + np.outer(s, 6 * coefficients[3])
+    crossed = np.cross(first[:, :3], second[:, :3])
+    return np.linalg.norm(crossed, axis=1) / np.linalg.norm(first[:, :3], axis=1) ** 3
+
+
+def chord_speed(curvature, period, error):
+    """Speed at which a chord of one period is as far off as is allowed."""
+    radius = 1.0 / curvature if curvature > 0.0 else np.inf
+    if radius == np.inf:
+        return np.inf
+    chord = 2.0 * np.sqrt(error * (2.0 * radius - error)) if radius > error else 2.0 * error
+    return chord / period
+
+
+def path_excesses(profile, path_limits, points):
+    """Largest ratios of the acceleration along the path, and of the speed to that of its curvature."""
+    worst = np.zeros(2)
+    for m in range(len(profile)):
+        k = profile.cell[m]
+        if profile.path.stretch[k] == 0.0:
+            continue
+        for t in profile.time[m] + profile.duration[m] * np.linspace(0.0, 1.0, points):
+            e = t - profile.time[m]
+            s = profile.u[m] + profile.velocity[m] * e + 0.5 * profile.acceleration[m] * e**2
+            v = profile.velocity[m] + profile.acceleration[m] * e
+            c = profile.path.coefficients[k]
+            first, second = c[1] + 2 * c[2] * s + 3 * c[3] * s**2, 2 * c[2] + 6 * c[3] * s
+            tangent = first[:3] / np.linalg.norm(first[:3])
+            push = abs(tangent @ (first * profile.acceleration[m] + second * v**2)[:3])
+            allowed = chord_speed(
+                curvatures(c, np.array([s]))[0], path_limits.interpolation_period, path_limits.chord_error
+            )
+            speed = np.linalg.norm(first[:3]) * v
+            worst = np.maximum(worst, [push / path_limits.acceleration, speed / allowed])
+    return worst
+
+
+def chord_errors(position, per_chord):
+    """Largest distance of fine samples (n,3) from the chord they belong to, chord by chord."""
+    errors = []
+    for first in range(0, len(position) - per_chord, per_chord):
+        start, end = position[first], position[first + per_chord]
+        span = float((end - start) @ (end - start))
+        inside = position[first : first + per_chord + 1]
+        share = np.clip((inside - start) @ (end - start) / span, 0.0, 1.0) if span > 0.0 else 0.0
+        foot = start + np.multiply.outer(np.atleast_1d(share), end - start)
+        errors.append(np.linalg.norm(inside - foot, axis=1).max())
+    return np.array(errors)

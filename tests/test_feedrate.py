@@ -21,6 +21,7 @@ from cnc_shape.limits import Limits
 from cnc_shape.program import PathMode
 from cnc_shape.smoothing import Path, Smoothing, join_paths, smooth
 
+NO_LIMIT = frozen(np.empty(0))
 SQUARE = [[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]]
 
 
@@ -204,7 +205,9 @@ def test_the_scan_is_the_solution_of_its_linear_programs():
     limit_v2, straight = speed_limits(
         path.coefficients, path.length, path.feed_rate, rotary_only(path), velocity, acceleration
     )
-    reach, _ = backward(path.coefficients, path.length, path.stop, limit_v2, straight, acceleration, np.inf)
+    reach, _ = backward(
+        path.coefficients, path.length, path.stop, limit_v2, straight, acceleration, NO_LIMIT, np.inf
+    )
     profile = plan(path, MILL)
     slow_reach, slow_speed = naive.fastest(path, limit_v2, acceleration)
     assert_allclose(reach, slow_reach, rtol=1e-6, atol=1e-6)
@@ -319,7 +322,9 @@ def test_look_ahead_is_a_stopping_distance_not_a_number_of_blocks():
         limit_v2, straight = speed_limits(
             part.coefficients, part.length, part.feed_rate, rotary_only(part), velocity, acceleration
         )
-        return backward(part.coefficients, part.length, part.stop, limit_v2, straight, acceleration, np.inf)
+        return backward(
+            part.coefficients, part.length, part.stop, limit_v2, straight, acceleration, NO_LIMIT, np.inf
+        )
 
     whole, _ = reach(len(path))
     part, free = reach(2000)  # as if the path rested there

@@ -203,9 +203,8 @@ def recorded(case, **limits):
             ContourError(part[name], part["foot"], part["time"], lines)
             for name in ("command_error", "drive_error", "tool_error")
         ]
-        recorder.add(
-            Response(command, part["position"], part["position"], part["tool"], part["position"]), errors
-        )
+        at = part["position"]
+        recorder.add(Response(command, at, at, at, part["tool"], at, at[:0, 0]), errors)
     return recorder.signals(case.settling)
 
 

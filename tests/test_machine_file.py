@@ -24,7 +24,7 @@ from cnc_shape.config.strict import Strict
 from cnc_shape.config.template import machine_template
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Feedforward, Form
 from cnc_shape.errors import CncShapeError, ConfigError, OptionError
-from cnc_shape.limits import Limits
+from cnc_shape.limits import Limits, PathLimits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine
 from cnc_shape.modes import Mode
 from cnc_shape.shapers import SHAPERS, cascade, zv, zvd
@@ -163,6 +163,23 @@ def test_jerk_limits_warn_once_that_they_do_not_limit_yet() -> None:
     assert setup.warnings == (
         "machine.yaml:2: warning: jerk limits are read, but do not limit the motion yet",
     )
+
+
+@pytest.mark.parametrize(
+    ("keys", "limits"),
+    [
+        ("path_acceleration_mm_s2: 160", PathLimits(160.0)),
+        ("interpolation_period_s: 0.008, chord_error_mm: 0.001", PathLimits(inf, 0.008, 0.001)),
+        (
+            "path_acceleration_mm_s2: 160, interpolation_period_s: 8e-3, chord_error_mm: 1e-3",
+            PathLimits(160.0, 0.008, 0.001),
+        ),
+    ],
+)
+def test_limits_along_the_path_arrive_and_come_back(keys: str, limits: PathLimits) -> None:
+    setup = parse(SMALL + f"planning: {{{keys}}}")
+    assert setup.planning == Planning(path_limits=limits)
+    assert parse(dump_machine(setup)) == setup
 
 
 # --- refusals
@@ -320,7 +337,10 @@ def test_what_an_axis_cannot_be_is_refused_at_its_place(text: str, column: int, 
         (SMALL + 'name: "\\ud800"', (2, 7), "name: must be one printable line"),
         (SMALL + "disturbances: []", (2, 1), "disturbances: not built yet"),
         (SMALL + "planning: {shaping: axes}", (2, 21), "planning.shaping: must be contour, axis, path or none"),
-        (SMALL + "planning: {chord_error_mm: 1}", (2, 12), "planning.chord_error_mm: not built yet"),
+        (SMALL + "planning: {chord_error_mm: 0.001}", (2, 28), "only together with interpolation_period_s"),
+        (SMALL + "planning: {interpolation_period_s: 0.008}", (2, 36), "only together with chord_error_mm"),
+        (SMALL + "planning: {interpolation_period_s: 0, chord_error_mm: 1}", (2, 36), "at least 1e-06, not 0"),
+        (SMALL + "planning: {path_acceleration_mm_s2: 0}", (2, 37), "must be greater than 0, not 0"),
         (SMALL + "planning: {tool_tolerance_mm: 0}", (2, 31), "planning.tool_tolerance_mm: must be at least"),
         (SMALL + "planning: {path_tolerance_mm: 0}", (2, 31), "must be at least 1e-06, not 0"),
         (SMALL + "control: {sample_time_s: 0}", (2, 26), "must be at least 1e-06, not 0"),

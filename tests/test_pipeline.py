@@ -37,8 +37,11 @@ SAMPLES = {
     "clover.csv": "xy_stage.yaml",
     "probing.nc": "cmm.yaml",
     "circle_time.csv": "xy_stage.yaml",
+    "fan.nc": "cubic_parallel.yaml",
+    "helix.nc": "cubic_parallel.yaml",
+    "circle5_time.csv": "cubic_parallel.yaml",
 }
-PROGRAMS = [name for name in SAMPLES if name != "circle_time.csv"]
+PROGRAMS = [name for name in SAMPLES if not name.endswith("_time.csv")]
 
 
 def setup_of(sample: str):

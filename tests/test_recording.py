@@ -56,7 +56,9 @@ class Motion:
                 )
                 for e in self.errors
             ]  # fmt: skip
-            recorder.add(Response(trajectory, position, position, tool, position), errors)
+            recorder.add(
+                Response(trajectory, position, position, position, tool, position, position[:0, 0]), errors
+            )
         return recorder.signals(SETTLING)
 
 

@@ -25,7 +25,7 @@ from cnc_shape.controllers.loop_model import (
     open_loop,
     poles,
 )
-from cnc_shape.controllers.margins import Margins, margins, worst_margins
+from cnc_shape.controllers.margins import Margins, _over_negative_axis, margins, worst_margins
 from cnc_shape.controllers.stability import (
     DIRECTIONS,
     check_along,
@@ -264,8 +264,24 @@ def test_sensitivity_of_unlike_drives_is_the_largest_singular_value():
     loop = Control(T, 20.0, 1, None, pid(80.0, "PID"))
     model = loop_model(DRIVES, loop, AT, Z[None])
     transfer = loop_transfer(model, np.exp(1j * T * np.geomspace(0.1, np.pi / T, 20_000)))[0]
+    lever = np.diag(np.linalg.norm(np.linalg.inv(AT[0])[:3], axis=0))  # mm at the tool per mm of a joint
+    transfer = lever @ transfer @ np.linalg.inv(lever)
     brute = np.linalg.norm(np.linalg.inv(np.eye(6) + transfer), ord=2, axis=(1, 2)).max()
     assert_allclose(margins(DRIVES, loop, AT[0], Z).sensitivity, brute, rtol=1e-6)
+
+
+def test_a_curve_over_the_positive_axis_is_not_taken_for_one_over_the_negative():
+    """Angles from the negative axis: one passes half a turn, which shifts the sorted others by a place."""
+    angles = np.array([[-1.0, 0.5, 3.1], [-1.0, 0.5, 3.2], [-0.1, 0.5, 3.2], [0.1, 0.5, 3.2]])
+    assert_array_equal(_over_negative_axis(-np.exp(1j * angles)), [False, False, True])
+
+
+def test_margins_do_not_depend_on_the_unit_of_a_joint():
+    loop = Control(T, 20.0, 1, None, pid(80.0, "PID"))
+    degrees = np.diag([1.0, 57.3, 1.0, 1.0, 1.0, 0.01]) @ AT[0]
+    found, other = margins(DRIVES, loop, AT[0], Z), margins(DRIVES, loop, degrees, Z)
+    for name in ("gain", "phase", "sensitivity", "delay"):
+        assert_allclose(getattr(other, name), getattr(found, name), rtol=1e-5)
 
 
 def test_worst_margins_are_those_of_the_worst_directions():

@@ -31,6 +31,7 @@ TWINS = {
     "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
     "kernels/linear.py": ("np.linalg", "test_kinematics.py"),
     "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),
+    "kernels/path_limits.py": ("naive.path_excesses", "test_path_limits.py"),
     "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python
     "kernels/plain_rows.py": ("read_rows", "test_plain_rows.py"),  # the reader in Python
     "kernels/polyline.py": ("naive.tangent_polygon", "test_polyline.py"),

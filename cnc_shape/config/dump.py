@@ -64,6 +64,10 @@ def _planning(planning: Planning) -> dict[str, object]:
     }
     if planning.tool_tolerance is not None:
         keys["tool_tolerance_mm"] = planning.tool_tolerance
+    if isfinite(planning.path_limits.acceleration):
+        keys["path_acceleration_mm_s2"] = planning.path_limits.acceleration
+    if chord := planning.path_limits.chord:
+        keys["interpolation_period_s"], keys["chord_error_mm"] = chord
     return keys
 
 

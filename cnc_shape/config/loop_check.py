@@ -40,7 +40,7 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
         axes, control = cartesian_loop(joints.drives, control)
         home = np.eye(len(axes))[None]
     else:
-        axes = joints.drives
+        axes = joints.drives[: joints.coupled]
         home = joints.inverse_jacobian(np.zeros((1, len(axes))))
         home = home[np.isfinite(home).all(axis=(1, 2))]
         home = home[np.linalg.cond(home) < SINGULAR]

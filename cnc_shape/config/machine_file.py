@@ -19,10 +19,10 @@ from cnc_shape.config.models import (
     LinearAxisModel,
     MachineModel,
     ModeModel,
-    PlanningModel,
     RotaryAxisModel,
 )
-from cnc_shape.config.setup import Planning, Setup, ShaperChoice, Shaping
+from cnc_shape.config.planning import planning_of
+from cnc_shape.config.setup import Setup, ShaperChoice
 from cnc_shape.config.shaper_options import NONE, design, key_of
 from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refuse
 from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
@@ -100,7 +100,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     notes = (*_jerk_note(tree, axes), *_single_mode_notes(tree, machine, choices))
     setup = Setup(
         machine=machine,
-        planning=_planning(source, tree, model.planning),
+        planning=planning_of(source, tree, model.planning),
         control=read_control(source, tree, model.control, kinematics),
         tools=_tools(source, tree, model),
         choices=choices,
@@ -214,24 +214,6 @@ def _shaper(source: str, tree: Tree, axis: Axis, choice: ShaperChoice) -> Shaper
         key = key_of(error.argument)
         place, walked = locate(tree, path if key is None else (*path, key))
         refuse(source, place, f"{dotted(walked)}: {error.reason}", error.hint)
-
-
-def _planning(source: str, tree: Tree, model: PlanningModel) -> Planning:
-    tolerance = model.tool_tolerance_mm
-    if tolerance is not None and tolerance <= model.path_tolerance_mm:
-        place, _ = locate(tree, ("planning", "tool_tolerance_mm"))
-        reason = (
-            f"planning.tool_tolerance_mm: {tolerance:g} mm is not more than path_tolerance_mm, by which "
-            f"the path itself may leave the program ({model.path_tolerance_mm:g} mm)"
-        )
-        refuse(source, place, reason, "lower path_tolerance_mm, or allow the tool more")
-    return Planning(
-        path_tolerance=model.path_tolerance_mm,
-        shaping=Shaping(model.shaping),
-        stop_dwell=model.stop_dwell_shaper_durations,
-        aligned=model.align,
-        tool_tolerance=model.tool_tolerance_mm,
-    )
 
 
 def _tools(source: str, tree: Tree, model: MachineModel) -> tuple[Tool, ...]:

@@ -115,14 +115,14 @@ class JointModel(Strict):
 class PlanningModel(Strict):
     """How motion is planned."""
 
-    keys_not_built: ClassVar[frozenset[str]] = frozenset(
-        {"path_acceleration_mm_s2", "interpolation_period_s", "chord_error_mm"}
-    )
     path_tolerance_mm: Annotated[float, Field(ge=1e-6, le=100.0)] = 0.01
     shaping: Literal["contour", "axis", "path", "none"] = "contour"
     stop_dwell_shaper_durations: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
     align: bool = True
     tool_tolerance_mm: Annotated[float, Field(ge=1e-5, le=100.0)] | None = None
+    path_acceleration_mm_s2: Positive | None = None
+    interpolation_period_s: Annotated[float, Field(ge=1e-6, le=1.0)] | None = None
+    chord_error_mm: Annotated[float, Field(ge=1e-6, le=100.0)] | None = None
 
 
 class FeedforwardModel(Strict):

@@ -8,6 +8,7 @@ from enum import Enum
 
 from cnc_shape.controllers import Control
 from cnc_shape.kinematics import Kinematics, cartesian
+from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
 from cnc_shape.machine import Machine
 from cnc_shape.shapers import Shaper
 from cnc_shape.shapers.command_shaping import CommandShaping
@@ -34,6 +35,7 @@ class Planning:
     stop_dwell: float = 0.5  # -, of the longest shaper: rest at every stop on the way
     aligned: bool = True  # axis shaping: all axes late alike
     tool_tolerance: float | None = None  # mm, contour error of the tool above which the motion slows down
+    path_limits: PathLimits = NO_PATH_LIMITS
 
 
 @dataclass(frozen=True, slots=True)

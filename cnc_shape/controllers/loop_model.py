@@ -50,6 +50,7 @@ class LoopModel:
     across: FloatArray  # (n,3,j) contour error per joint error
     back: FloatArray  # (n,j,3) joint velocity per Cartesian velocity
     turn: FloatArray  # (n,j,j) joint velocity of the orientation term per joint error
+    lever: FloatArray  # (n,j) mm that the tool moves per unit of a joint; 1 where a joint does not move it
     reach: FloatArray  # (n,3,3) projection onto the contour errors that the drives can make
 
     def __len__(self) -> int:
@@ -89,6 +90,7 @@ def loop_model(
     turn[:, :size, :size] = coupling.orientation * inverse_jacobians[:, :, linear:] @ forward[:, linear:]
     lagging = np.array([isinstance(drive, FirstOrderLag) for drive in drives], dtype=bool)
     across = (made - tangents[:, :, None] * (tangents[:, None, :] @ made))[:, :, lagging]
+    moved = np.sqrt((made[:, :, lagging] ** 2).sum(axis=1))
     gains = np.array(control.joint_gains or [control.position_gain] * joints, dtype=np.float64)
     axes = [Axis("", UNBOUNDED, drive) for drive in drives if isinstance(drive, FirstOrderLag)]
     plant = discretise(axes, control.sample_time) if axes else None
@@ -102,6 +104,7 @@ def loop_model(
         across,
         back[:, lagging],
         turn[:, lagging][:, :, lagging],
+        np.where(moved > NO_REACH, moved, 1.0),
         _reach(across),
     )
 
@@ -216,6 +219,7 @@ def joint_of(model: LoopModel, joint: int, gain: float) -> LoopModel:
         across=np.zeros((1, 3, 1)),
         back=np.zeros((1, 1, 3)),
         turn=np.zeros((1, 1, 1)),
+        lever=np.ones((1, 1)),
         reach=np.zeros((1, 3, 3)),
     )
 
@@ -232,6 +236,7 @@ def rows_of(model: LoopModel, rows: NDArray[np.intp]) -> LoopModel:
         across=model.across[rows],
         back=model.back[rows],
         turn=model.turn[rows],
+        lever=model.lever[rows],
         reach=model.reach[rows],
     )
 

@@ -38,7 +38,7 @@ class Margins:
 
     gain: float  # -, factor of the gain above 1
     phase: float  # rad
-    sensitivity: float  # -, largest singular value of (1 + L)^-1 over frequency
+    sensitivity: float  # -, largest singular value of (1 + L)^-1, joints counted in mm at the tool
     delay: float  # s
 
 
@@ -178,12 +178,16 @@ def _over_negative_axis(curves: Eigenvalues) -> BoolArray:
 
 
 def _sensitivity(model: LoopModel, grid: FloatArray) -> float:
-    """Largest singular value of (1 + L)^-1 over frequency, around the highest point of the grid."""
+    """Largest singular value of (1 + L)^-1 over frequency, around the highest point of the grid.
+
+    A joint's motion counts by how far it moves the tool: else mm would stand against rad.
+    """
     identity = np.eye(model.gains.size)
+    scale = model.lever[0][:, None] / model.lever[0]
 
     def size(frequencies: FloatArray) -> FloatArray:
         transfer = loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0]
-        smallest = np.linalg.svd(identity + transfer, compute_uv=False)[:, -1]
+        smallest = np.linalg.svd(identity + scale * transfer, compute_uv=False)[:, -1]
         return np.asarray(1.0 / smallest, dtype=np.float64)
 
     sizes = size(grid)

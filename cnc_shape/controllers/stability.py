@@ -33,7 +33,7 @@ from cnc_shape.program import ROTARY
 GAIN_RESOLUTION = 1e-5  # -, of the largest stable gain that is told
 MOST_STATES = 120  # of a loop whose poles are computed
 GROWTH = 1.5  # -, of the gain from one look to the next, upwards
-MOST_GROWTH = 1e6  # -, beyond which a gain has no end
+MOST_GROWTH = 1e6  # -, beyond which a gain has no end; its inverse is as good as none
 LINEAR = ("x", "y", "z")
 HINT = "lower position_gain_per_s or cross_coupling.proportional_per_s, or sample faster"
 
@@ -252,7 +252,7 @@ def _largest_factor(stable: Callable[[float], bool]) -> float:
         low, high = high, GROWTH * high
         if high > MOST_GROWTH:
             return np.inf
-    while high - low > GAIN_RESOLUTION * high:
+    while high - low > GAIN_RESOLUTION * high and high > 1.0 / MOST_GROWTH:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return low

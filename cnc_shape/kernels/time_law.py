@@ -6,6 +6,8 @@ three Bernstein coefficients do, each of which is linear in (a, x0):
 
     q'_0 a + q''_0 x0,     (q'_0 + 1.5 h q''_0) a + (q''_0 + q''_1)/2 x0,     (q'_1 + 2 h q''_1) a + q''_1 x0
 
+Where the acceleration along the path is limited as well, `kernels/path_limits.py` adds five such rows.
+
 Backwards, the largest x0 from which the next node is reached in time; forwards, the largest a.
 
 Source: Q.-C. Pham, H. Pham, "A new approach to time-optimal path parameterization based on reachability
@@ -16,6 +18,7 @@ analysis", IEEE Trans. Robotics 34 (2018), doi:10.1109/TRO.2018.2819195.
 import numpy as np
 
 from cnc_shape.kernels import kernel
+from cnc_shape.kernels.path_limits import ALONG_ROWS, along_bounds
 from cnc_shape.kernels.speed_limits import ends
 
 MARGIN = 1e-9  # -, by which the scan must clear the next node's speed to be called independent of it
@@ -26,8 +29,10 @@ MOST_STEPS = 60  # of Newton, on a gap of at most 6 d pieces
 
 
 @kernel
-def bounds(rows, h, acceleration, d1, d2, e1, e2, base, slope):
-    """Lines ``|a - slope x| <= base`` of a curved cell, 3 d of them; returns the limit of x by itself.
+def bounds(rows, h, acceleration, along, d1, d2, e1, e2, base, slope):
+    """Lines ``|a - slope x| <= base`` of a curved cell; returns the limit of x by itself.
+
+    There are 3 d of them, and those of the acceleration along the path where there is room for them.
 
     Where the factor of `a` vanishes but for rounding, the line is so steep that `a` would have no digits
     left. Such a row limits x alone, with some slack for what `a` could add.
@@ -48,9 +53,14 @@ def bounds(rows, h, acceleration, d1, d2, e1, e2, base, slope):
             base[3 * i + r] = acceleration[i] / p
             slope[3 * i + r] = s
             least = min(least, abs(base[3 * i + r]))
+    own = 3 * d1.size
+    if base.size > own:
+        along_bounds(h, d1, d2, e1, e2, along, own, base, slope)
+        for n in range(own, base.size):
+            least = min(least, abs(base[n]))
     cap = np.inf
     for n in range(base.size):
-        limit = acceleration[n // 3]
+        limit = acceleration[n // 3] if n < own else 1.0
         if abs(base[n]) < STEEPEST * least and abs(base[n]) < np.inf:
             slope[n] *= -base[n] / limit
             base[n] = abs(base[n])
@@ -104,11 +114,13 @@ def largest_start(x, next_v2, h, base, slope):
 
 
 @kernel
-def backward(rows, length, stop, limit_v2, straight, acceleration, before_v2):
+def backward(rows, length, stop, limit_v2, straight, acceleration, along, before_v2):
     """Largest squared speed at every node from which all that follows can be kept.
 
     Parameters
     ----------
+    along
+        (k,) limit of the acceleration along the path; (0,) where there is none.
     before_v2
         Limit of the cell before the first one.
 
@@ -128,8 +140,9 @@ def backward(rows, length, stop, limit_v2, straight, acceleration, before_v2):
     d2 = np.empty(d)
     e1 = np.empty(d)
     e2 = np.empty(d)
-    base = np.empty(3 * d)
-    slope = np.empty(3 * d)
+    lines = 3 * d + (ALONG_ROWS if along.size > 0 else 0)
+    base = np.empty(lines)
+    slope = np.empty(lines)
     for k in range(count - 1, -1, -1):
         h = length[k]
         cap = 0.0 if stop[k] == 1 else min(limit_v2[k, 0], limit_v2[k - 1, 1] if k > 0 else before_v2)
@@ -143,7 +156,12 @@ def backward(rows, length, stop, limit_v2, straight, acceleration, before_v2):
             if next_v2 * (1.0 - MARGIN) + gain * (1.0 - MARGIN) >= cap and k < count - 1:
                 free[k] = 1
             continue
-        x = min(cap, bounds(rows[k], h, acceleration, d1, d2, e1, e2, base, slope))
+        x = min(
+            cap,
+            bounds(
+                rows[k], h, acceleration, along[k] if along.size > 0 else np.inf, d1, d2, e1, e2, base, slope
+            ),
+        )
         own_next = 0.0
         if k < count - 1 and stop[k + 1] == 0:
             own_next = min(limit_v2[k, 1], limit_v2[k + 1, 0])
@@ -159,7 +177,7 @@ def backward(rows, length, stop, limit_v2, straight, acceleration, before_v2):
 
 
 @kernel
-def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, reach_v2, clock):
+def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, along, reach_v2, clock):
     """Pieces of constant acceleration through the first cells of a path, as fast as can be.
 
     `clock` (3,) holds the time, its rounding error, and the squared speed; it is updated in place.
@@ -178,8 +196,9 @@ def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, reach_v
     d2 = np.empty(d)
     e1 = np.empty(d)
     e2 = np.empty(d)
-    base = np.empty(3 * d)
-    slope = np.empty(3 * d)
+    lines = 3 * d + (ALONG_ROWS if along.size > 0 else 0)
+    base = np.empty(lines)
+    slope = np.empty(lines)
     steps = np.empty((3, 4))  # duration, place, velocity, acceleration
     m = 0
     x = clock[2]
@@ -222,7 +241,9 @@ def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, reach_v
                 used += 1
             x = following
         elif h > 0.0:
-            bounds(rows[k], h, acceleration, d1, d2, e1, e2, base, slope)
+            bounds(
+                rows[k], h, acceleration, along[k] if along.size > 0 else np.inf, d1, d2, e1, e2, base, slope
+            )
             low, _, high, _ = window(x, base, slope)
             a = max(min(high, (reach_v2[k + 1] - x) / (2.0 * h)), min(low, high), -x / (2.0 * h))
             following = min(max(x + 2.0 * a * h, 0.0), reach_v2[k + 1])

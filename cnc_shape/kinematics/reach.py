@@ -7,10 +7,10 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kernels.linear import conditions
 from cnc_shape.kinematics.kinematics import Kinematics
+from cnc_shape.program import ROTARY
 
 CONDITION_LIMIT = 1e4  # of the inverse Jacobian in the 1-norm, above which a pose counts as singular
 BLOCK = 4096  # poses looked at together
-ROTARY = frozenset("abc")
 
 
 def first_refusal(kinematics: Kinematics, axes: FloatArray) -> tuple[int, str] | None:
@@ -47,11 +47,16 @@ def condition(kinematics: Kinematics, axes: FloatArray) -> tuple[FloatArray, Flo
     reach, the number is nan.
     """
     number, determinant = np.empty(len(axes)), np.empty(len(axes))
+    conditions(frozen(kinematics.inverse_jacobian(axes)), *_weights(kinematics), number, determinant)
+    return number, determinant
+
+
+def _weights(kinematics: Kinematics) -> tuple[FloatArray, FloatArray]:
+    """Weights of joints and of axes, (d,) each."""
     mm = kinematics.radian
     rows = frozen([mm if name in ROTARY else 1.0 for name in kinematics.joints])
     columns = frozen([1.0 / mm if name in ROTARY else 1.0 for name in kinematics.axes])
-    conditions(frozen(kinematics.inverse_jacobian(axes)), rows, columns, number, determinant)
-    return number, determinant
+    return rows, columns
 
 
 def _unreached(kinematics: Kinematics, joints: FloatArray) -> str:

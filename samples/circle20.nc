@@ -1,0 +1,7 @@
+(Circle of radius 20 mm)
+G17 G21 G90 G94
+G61
+G0 X20 Y0 Z0
+F960
+G3 X20 Y0 I-20 J0
+M2

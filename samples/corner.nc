@@ -1,0 +1,8 @@
+(A right angle)
+G17 G21 G90 G94
+G61
+G0 X0 Y0 Z0
+F960
+G1 X30
+G1 Y30
+M2

@@ -1,0 +1,8 @@
+(Helix of radius 20 mm and pitch 10 mm, two turns)
+G17 G21 G90 G94
+G61
+G0 X20 Y0 Z0
+F960
+G3 X20 Y0 Z10 I-20 J0
+G3 X20 Y0 Z20 I-20 J0
+M2
