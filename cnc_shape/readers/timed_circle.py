@@ -12,6 +12,7 @@ from cnc_shape.errors import InfeasibleError, ProgramError
 from cnc_shape.program import Motion
 from cnc_shape.readers.timed import SAME_POINT, Spans, TimedPath, TimedPoints, new_points, timed_path
 from cnc_shape.readers.waypoints import polyline
+from cnc_shape.units import MICROMETRE
 
 OFF_CIRCLE = 1e-3  # mm, by which a row may leave the circle
 OFF_CIRCLE_SHARE = 1e-4  # -, of the radius, by which it may leave a large one
@@ -145,7 +146,7 @@ def _refuse_rows_off(points: TimedPoints, circle: Circle) -> None:
     if not off[worst] <= allowed:
         raise ProgramError(
             points.source, int(points.line[worst]), 1,
-            f"the row is {off[worst] * 1e3:.3g} µm off the circle of radius {circle.radius:.6g} mm through "
-            f"the rows, by more than {allowed * 1e3:.3g} µm",
+            f"the row is {off[worst] / MICROMETRE:.6g} µm off the circle of radius {circle.radius:.6g} mm "
+            f"through the rows, by more than {allowed / MICROMETRE:.3g} µm",
             hint="take --path spline or --path polyline",
         )  # fmt: skip
