@@ -379,6 +379,15 @@ def test_a_table_that_is_coarser_than_the_servo_runs_along_its_spline():
     assert np.ptp(standing, axis=0).max() < 1e-12
 
 
+def test_a_coarse_table_speeds_up_smoothly_along_its_spline():
+    """Straight lines in time would be off by a h^2 / 8, 8 µm."""
+    time = 0.02 * np.arange(11)
+    command, _ = command_of(table(time, {"x_mm": 0.5 * ALONG * time**2}), T, SPLINE)
+    late = slice(40, 180)  # away from the ends, whose slope is a guess
+    true = 0.5 * ALONG * (T * np.arange(len(command))) ** 2
+    assert_allclose(command.position[late, 0], true[late], atol=1e-3)
+
+
 @pytest.mark.parametrize("curve", [POLYLINE, SPLINE, CIRCLE])
 def test_rows_at_the_servo_period_are_the_command(curve):
     angle = np.linspace(0.0, 1.0, 100) ** 2
