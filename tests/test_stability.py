@@ -400,11 +400,11 @@ def test_the_direction_told_is_the_one_that_ends_the_gain(monkeypatch):
     unlike = tuple(FirstOrderLag(tau) for tau in (0.007, 0.021, 0.013))
     far = Control(T, 10.0, 2, None, CrossCoupling(20_000.0))
     inverse = linear_delta(150.0, 300.0).inverse_jacobian(np.zeros((1, 3)))
+    everywhere = np.repeat(inverse, len(DIRECTIONS), axis=0)
     limits = [largest_stable_coupling(unlike, far, inverse, line[None]) for line in DIRECTIONS]
     for most in (stability.MOST_STATES, 1):  # by poles, by frequency response
         monkeypatch.setattr(stability, "MOST_STATES", most)
         with pytest.raises(InfeasibleError) as refused:
-            everywhere = np.repeat(inverse, len(DIRECTIONS), axis=0)
             check_along(unlike, far, everywhere, DIRECTIONS, "direction {}".format)
         assert f"direction {int(np.argmin(limits))}, moving" in str(refused.value)
 
