@@ -176,3 +176,15 @@ def test_joints_without_their_kinematics_are_a_wrong_call():
     command, _ = polygon_run()
     with pytest.raises(ValueError, match="give the kinematics"):
         simulate(command, machine(PLANTS), Control(T))
+
+
+def test_an_error_of_ten_metres_is_a_loop_that_diverged():
+    """The integral of a length grows without end; its first 100 m are no contour error to tell."""
+    command, path = polygon_run(dwell=12_000)
+    control = Control(T, 10.0, 3, None, CrossCoupling(10.0, Estimator.FOOT_POINT, 300.0, form=Form.SCALAR))
+    with pytest.raises(InfeasibleError, match="the loop diverged: axis") as refused:
+        simulate(command, machine(None), control, toolpath=path, reach=REACH)
+    time = float(str(refused.value).split("t = ")[1].split()[0])
+    before = command.cut(slice(0, round(time / T)))
+    response = simulate(before, machine(None), control, toolpath=path, reach=REACH)
+    assert 2e3 < np.abs(response.following_error).max() <= 1e4

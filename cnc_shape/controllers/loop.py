@@ -20,7 +20,7 @@ from cnc_shape.controllers import cross_coupling, estimators, feedforward, posit
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.linear import solve
 
-FURTHEST = 1e6  # mm or rad, following error beyond which the loop has diverged
+FURTHEST = 1e4  # mm or rad, following error beyond which the loop has diverged
 FOOT_POINT = cross_coupling.Estimator.FOOT_POINT.value
 CIRCLE = cross_coupling.Estimator.CIRCLE.value
 
