@@ -11,8 +11,8 @@ the joints make of the axes::
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine
 from cnc_shape.refusals import check_on_the_way, check_own_loops, refuse_divergence, refuse_pose
+from cnc_shape.response import Response
 from cnc_shape.segments import path_table
 from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
 from cnc_shape.toolpath import Toolpath
@@ -31,32 +32,6 @@ from cnc_shape.windows import Reach, Windows, WindowState, foot_reach, windowing
 
 RESIDUAL_PERIODS = 10.0  # of the slowest mode, watched after the end
 SHORTEST_RESIDUAL_TIME = 0.5  # s
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Response:
-    """What drives and tool did under a command: a chunk of samples."""
-
-    command: Trajectory
-    reference: FloatArray  # (n,j) mm or rad, what the drives were told
-    joint: FloatArray  # (n,j) mm or rad, position of the drives
-    position: FloatArray  # (n,d) mm or rad, of the drives through the kinematics
-    tool: FloatArray  # (n,d) mm or rad, drives plus structure
-    drive: FloatArray  # (n,j) mm/s or rad/s, velocity command of the loop
-    turn: FloatArray  # (n,) rad between the tool's direction and what it should be; (0,): it does not turn
-    signals: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
-
-    @property
-    def following_error(self) -> FloatArray:
-        """What the drives were told minus where they are, (n,j) mm or rad."""
-        return self.reference - self.joint
-
-    def summary(self) -> str:
-        """Largest lag and deflection of every axis, in one line."""
-        following = np.abs(self.command.position - self.position).max(axis=0, initial=0.0)
-        deflection = np.abs(self.tool - self.position).max(axis=0, initial=0.0)
-        told = zip(self.command.axes, following.tolist(), deflection.tolist(), strict=True)
-        return "; ".join(f"{axis.upper()} follows to {f:.4g}, bends by {d:.4g}" for axis, f, d in told)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -276,8 +251,7 @@ class _Stage:
         there = self._joints.forward(frozen(joint), pose)
         position = self._joints.axes(there)
         turn = self._joints.kinematics.turn
-        own = self._joints.coupled
-        turned = frozen([]) if turn is None else turn(frozen(pose[:n, :own]), frozen(there[:n, :own]))
+        turned = frozen([]) if turn is None else turn(self._joints.own(pose[:n]), self._joints.own(there[:n]))
         if not self._structure.bends:
             return frozen(position[:n]), frozen(position[:n]), turned
         velocity = self._joints.axes(self._joints.velocity(there, frozen(rate)))
