@@ -163,7 +163,7 @@ def _noted(chunks: Iterable[Program], notes: list[Note]) -> Iterator[Program]:
 
 def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterator[Block]:
     """Refuse the first commanded pose that the machine cannot hold, with its line, before it goes further."""
-    if setup.kinematics.name == CARTESIAN.name:
+    if setup.kinematics == CARTESIAN:
         yield from blocks
         return
     look = windowing(NOWHERE_ELSE)
@@ -172,7 +172,8 @@ def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterato
     first: Timing | None = None
     begun = False
     for block in blocks:
-        first, begun = (first, True) if begun else (block.timing, True)
+        if not begun:
+            first, begun = block.timing, True
         if block.timing == first:
             command = block.command
             places, windows = look(places, block.toolpath, command.arc_length, block.last)
