@@ -43,6 +43,7 @@ class SimulationState:
     begun: bool  # loop and structure rest where the command begins, or have gone on from there
     held: Trajectory  # samples that wait for the one after them, or for their windows
     ticks: int  # run so far
+    before: FloatArray  # (1,j) mm or rad, what the drives were told last; (0,) before the first
     inverse: FloatArray  # (1,c,c) inverse Jacobian in use, (0,c,c) before the first
     windows: WindowState | None
     source: str  # of the toolpath
@@ -154,7 +155,7 @@ class _Stage:
         if ticks == 0:
             kept = replace(now, held=held, windows=places, source=source)
             return kept, self._nothing(command.cut(slice(0, 0)))
-        pose, told = self._told(command, ticks)
+        pose, told = self._told(now, command, ticks)
         if windows is not None:
             refuse_pose(self._joints, pose, command.arc_length, windows, source)
         poses, inverse = self._poses(now, pose, ticks)
@@ -173,8 +174,9 @@ class _Stage:
             settling = self._settle(now, poses, told, windows, tool[-1:] - position[-1:])
         done = now.ticks + ticks
         return SimulationState(
-            now.loop, now.structure, True, held, done, inverse, places, source, settling
-        ), response
+            now.loop, now.structure, True, held, done, told.reference[ticks - 1 : ticks], inverse, places,
+            source, settling,
+        ), response  # fmt: skip
 
     def _start(self, command: Trajectory) -> SimulationState:
         if command.sample_time != self._period:
@@ -189,23 +191,29 @@ class _Stage:
         bent = None if self._structure is None else self._structure.start(np.zeros(len(command.axes)))
         none = frozen(np.zeros((0, self._joints.coupled, self._joints.coupled)))
         return SimulationState(
-            nowhere, bent, False, command.cut(slice(0, 0)), 0, none, None, "",
+            nowhere, bent, False, command.cut(slice(0, 0)), 0, frozen([]), none, None, "",
             frozen(np.zeros((0, len(command.axes)))),
         )  # fmt: skip
 
     def _begin(self, now: SimulationState, command: Trajectory) -> SimulationState:
         """Rest where the command begins."""
         at = command.position[:1]
-        loop = self._loop.start(self._joints.inverse(self._joints.pose(at))[0])
+        told = self._joints.inverse(self._joints.pose(at))
+        loop = self._loop.start(told[0])
         bent = None if self._structure is None else self._structure.start(at[0])
-        return replace(now, loop=loop, structure=bent, begun=True)
+        return replace(now, loop=loop, structure=bent, begun=True, before=told)
 
     def _nothing(self, command: Trajectory) -> Response:
         none = frozen(np.zeros((0, len(self._joints.drives))))
         return Response(command, none, none, command.position, command.position, none, frozen([]))
 
-    def _told(self, command: Trajectory, ticks: int) -> tuple[FloatArray, Command]:
-        """Poses and what the loop is told, one sample more than ticks: after the last, rest."""
+    def _told(self, now: SimulationState, command: Trajectory, ticks: int) -> tuple[FloatArray, Command]:
+        """Poses and what the loop is told, one sample more than ticks: after the last, rest.
+
+        Feedforward takes the acceleration of the coming sample from the change of velocity. A replayed
+        command's is a central difference, which spreads every change of acceleration over two samples: drives
+        are told that of the step which arrives, and its change is the second difference of their positions.
+        """
         rows = min(ticks + 1, len(command))
         position, velocity, acceleration = (
             values[:rows] for values in (command.position, command.velocity, command.acceleration)
@@ -217,8 +225,12 @@ class _Stage:
             )
         pose = self._joints.pose(frozen(position))
         rates = self._joints.rates(pose, self._joints.pose(frozen(velocity)))
+        reference = self._joints.inverse(pose)
+        if command.replayed:
+            steps = np.diff(reference, axis=0, prepend=now.before) / self._period
+            rates = np.where(self._loop.plant.ideal, rates, steps)
         return pose, Command(
-            frozen(position), frozen(velocity), frozen(acceleration), self._joints.inverse(pose), rates
+            frozen(position), frozen(velocity), frozen(acceleration), frozen(reference), frozen(rates)
         )
 
     def _poses(self, now: SimulationState, pose: FloatArray, ticks: int) -> tuple[Poses, FloatArray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -20,7 +20,9 @@ END_MARGIN = 1e-6  # -, of a sample: a motion that ends within it after a sample
 class Trajectory:
     """A chunk of samples of the axis commands, analytic in position, velocity and acceleration.
 
-    The first sample of a motion is at t = 0; the last is the first at or after its end, at rest.
+    The first sample of a motion is at t = 0; the last is the first at or after its end, at rest. A replayed
+    command was given by its positions alone: velocity and acceleration are differences of them. Once shaped
+    it is a sum of interpolants, which know their velocity, and replayed no more.
     """
 
     axes: tuple[str, ...]
@@ -29,6 +31,7 @@ class Trajectory:
     position: FloatArray  # (n,d) mm or rad
     velocity: FloatArray  # (n,d) mm/s or rad/s
     acceleration: FloatArray  # (n,d) mm/s^2 or rad/s^2
+    replayed: bool = field(default=False, kw_only=True)  # positions are all that was given
 
     def __len__(self) -> int:
         return self.arc_length.size
@@ -42,6 +45,7 @@ class Trajectory:
             self.position[rows],
             self.velocity[rows],
             self.acceleration[rows],
+            replayed=self.replayed,
         )
 
     def resting(self, row: int, samples: int) -> Trajectory:
@@ -49,7 +53,9 @@ class Trajectory:
         position = self.position[row]
         still = frozen(np.zeros((samples, position.size)))
         place = frozen(np.full(samples, self.arc_length[row]))
-        return Trajectory(self.axes, self.sample_time, place, frozen(still + position), still, still)
+        return Trajectory(
+            self.axes, self.sample_time, place, frozen(still + position), still, still, replayed=self.replayed
+        )
 
     def late_arc_length(self, first: int, delay: float) -> FloatArray:
         """The place from sample `first` on, `delay` samples ago, linear between samples."""
@@ -134,6 +140,7 @@ def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
         frozen(np.concatenate([part.position for part in parts])),
         frozen(np.concatenate([part.velocity for part in parts])),
         frozen(np.concatenate([part.acceleration for part in parts])),
+        replayed=parts[-1].replayed,
     )
 
 

@@ -1,7 +1,8 @@
 (Circle of radius 20 mm)
 G17 G21 G90 G94
-G61
-G0 X20 Y0 Z0
+G64 P0.001
 F960
+G1 X20 Y0 Z0
+G4 P0.5
 G3 X20 Y0 I-20 J0
 M2

@@ -1,8 +1,9 @@
 (Circle of radius 5 mm, three laps)
 G17 G21 G90 G94
-G61
-G0 X5 Y0 Z0
+G64 P0.001
 F960
+G1 X5 Y0 Z0
+G4 P0.5
 G3 X5 Y0 I-5 J0
 G3 X5 Y0 I-5 J0
 G3 X5 Y0 I-5 J0

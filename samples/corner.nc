@@ -1,7 +1,6 @@
 (A right angle)
 G17 G21 G90 G94
-G61
-G0 X0 Y0 Z0
+G64 P0.001
 F960
 G1 X30
 G1 Y30

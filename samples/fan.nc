@@ -1,8 +1,9 @@
 (Fan: a closed spline of three blades, as lines that leave it by 0.9 um at most)
 G17 G21 G90 G94
-G61
-G0 X23.6354 Y4.1676 Z0
+G64 P0.001
 F960
+G1 X23.6354 Y4.1676 Z0
+G4 P0.5
 G1 X24.39759 Y4.47893
 G1 X25.16198 Y4.7848
 G1 X25.92647 Y5.08381

@@ -1,8 +1,9 @@
 (Lemniscate: a figure of eight, as lines that leave it by 0.9 um at most)
 G17 G21 G90 G94
-G61
-G0 X30 Y0 Z0
+G64 P0.001
 F960
+G1 X30 Y0 Z0
+G4 P0.5
 G1 X29.99661 Y0.26042
 G1 X29.98644 Y0.52068
 G1 X29.96949 Y0.78062

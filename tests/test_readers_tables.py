@@ -143,8 +143,9 @@ def test_a_trajectory_is_resampled_linearly(file):
     assert_allclose(trajectory.position[:, 0], [0, 1.5, 3, 3, 3, 3, 3, 3, 3, 3, 3], atol=1e-12)
     assert_allclose(trajectory.position[:, 1], [0, 2, 4, 4, 4, 5, 6, 7, 8, 9, 10], atol=1e-12)
     assert_allclose(trajectory.arc_length, [0, 2.5, 5, 5, 5, 6, 7, 8, 9, 10, 11], atol=1e-12)
-    assert_allclose(trajectory.velocity[:, 1], [0, 20, 20, 0, 0, 10, 10, 10, 10, 10, 10], atol=1e-9)
-    assert_allclose(trajectory.acceleration[:, 1], [0, 200, 0, -200, 0, 100, 0, 0, 0, 0, 0], atol=1e-9)
+    assert_allclose(trajectory.velocity[:, 1], [0, 20, 10, 0, 5, 10, 10, 10, 10, 10, 0], atol=1e-9)
+    assert_allclose(trajectory.acceleration[:, 1], [0, 0, -200, 0, 100, 0, 0, 0, 0, 0, 0], atol=1e-9)
+    assert trajectory.replayed
     assert toolpath.kind.tolist() == [Motion.FEED, Motion.DWELL, Motion.FEED]
     assert_allclose(toolpath.arc_length, [0, 5, 5, 11])
     assert_allclose(toolpath.feed_rate[[0, 2]], [25.0, 10.0])
@@ -178,9 +179,10 @@ def test_readers_go_by_suffix_and_else_by_the_first_line(file):
             assert (opened.dialect, opened.lines) == ("csv", 3)
 
 
-def test_splines_through_way_points_are_not_built_yet(file):
-    with pytest.raises(OptionError, match="not built yet"):
-        read_program(file("x_mm,y_mm\n0,0\n1,1\n"), ReadingOptions(curve=Curve.SPLINE))
+@pytest.mark.parametrize("curve", [Curve.SPLINE, Curve.CIRCLE])
+def test_curves_through_way_points_are_not_built_yet(file, curve):
+    with pytest.raises(OptionError, match=f"--path {curve.value} is not built yet"):
+        read_program(file("x_mm,y_mm\n0,0\n1,1\n"), ReadingOptions(curve=curve))
 
 
 @pytest.mark.parametrize(

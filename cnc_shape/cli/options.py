@@ -18,8 +18,10 @@ Machine = Annotated[
 ]
 Dialect = Annotated[str, typer.Option(help="auto, rs274, grbl, marlin or fanuc.")]
 BlockDelete = Annotated[bool, typer.Option("--block-delete", help="Skip lines that start with /.")]
-PathStyle = Annotated[str, typer.Option("--path", help="How CSV way-points are joined: polyline.")]
-Closed = Annotated[bool, typer.Option("--closed", help="Join the last CSV way-point to the first.")]
+PathStyle = Annotated[
+    str, typer.Option("--path", help="What joins CSV rows: polyline; with times also spline or circle.")
+]
+Closed = Annotated[bool, typer.Option("--closed", help="Join the last CSV row to the first.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no warnings.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]

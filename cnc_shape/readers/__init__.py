@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from cnc_shape.errors import OptionError, ProgramError
 from cnc_shape.program import Program, concatenate
@@ -23,7 +23,9 @@ from cnc_shape.readers.source import (
     open_source,
 )
 from cnc_shape.readers.table import TIME, is_table, read_header
-from cnc_shape.readers.timed import TimedPoints, read_timed_points, timed_program
+from cnc_shape.readers.timed import TimedPath, TimedPoints, polyline_through, read_timed_points
+from cnc_shape.readers.timed_circle import circle_through
+from cnc_shape.readers.timed_spline import spline_through
 from cnc_shape.readers.waypoints import read_waypoints
 
 if TYPE_CHECKING:
@@ -34,7 +36,7 @@ CSV = "csv"  # dialect of tables
 
 
 class Curve(Enum):
-    """What joins the way-points of a table."""
+    """What joins the rows of a table."""
 
     POLYLINE = "polyline"
     SPLINE = "spline"
@@ -46,8 +48,8 @@ class ReadingOptions:
     """How to read a program or a table."""
 
     gcode: GcodeOptions = field(default_factory=GcodeOptions)
-    curve: Curve = Curve.POLYLINE  # of way-points
-    closed: bool = False  # way-points return to the first
+    curve: Curve = Curve.POLYLINE  # through the rows of a table
+    closed: bool = False  # the path through them returns to the first
     rows: int = CHUNK_ROWS  # of a chunk
     compiled_from: int = COMPILED_FROM  # bytes: in longer texts, plain lines take the compiled way
     limits: ReadingLimits = field(default_factory=ReadingLimits)
@@ -62,10 +64,21 @@ class Reading:
     lines: int
     axes: tuple[str, ...]
     chunks: Iterator[Program]
-    timed: TimedPoints | None = None  # the rows, if the table is a time trajectory
+    timed: TimedPath | None = None  # rows and their path, if the table is a time trajectory
     evidence: str = ""  # why this dialect
 
 
+class _Through(Protocol):
+    """Lay out the path through the rows of a time trajectory."""
+
+    def __call__(self, points: TimedPoints, *, closed: bool) -> TimedPath: ...
+
+
+PATHS: dict[Curve, _Through] = {
+    Curve.POLYLINE: polyline_through,
+    Curve.SPLINE: spline_through,
+    Curve.CIRCLE: circle_through,
+}
 Reader = Callable[[Source, ReadingOptions], Reading]
 
 
@@ -78,14 +91,15 @@ def gcode_reading(source: Source, options: ReadingOptions) -> Reading:
 
 def table_reading(source: Source, options: ReadingOptions) -> Reading:
     """Read way-points, or a time trajectory where the header has a time."""
-    if options.curve is not Curve.POLYLINE:
-        raise OptionError(f"--path {options.curve.value} is not built yet", hint="take --path polyline")
     header = read_header(source)
+    if options.curve is not Curve.POLYLINE and TIME not in header.names:
+        raise OptionError(f"--path {options.curve.value} is not built yet", hint="take --path polyline")
     rows, compiled_from = options.rows, options.compiled_from
     count = sum(count_lines(block) for block in blocks(source))
     if TIME in header.names:
         points = read_timed_points(source, header, rows=rows, compiled_from=compiled_from)
-        return Reading(source.name, CSV, count, header.axes, iter([timed_program(points)]), points)
+        path = PATHS[options.curve](points, closed=options.closed)
+        return Reading(source.name, CSV, count, header.axes, iter([path.program]), path)
     chunks = read_waypoints(source, header, closed=options.closed, rows=rows, compiled_from=compiled_from)
     return Reading(source.name, CSV, count, header.axes, chunks)
 
@@ -132,14 +146,14 @@ def read_chunks(path: str | Path, options: ReadingOptions | None = None) -> Iter
 
 
 def read_program(path: str | Path, options: ReadingOptions | None = None) -> Program:
-    """Read a whole program: G-code, or way-points, or the polyline of a time trajectory."""
+    """Read a whole program: G-code, or way-points, or the path of a time trajectory."""
     return concatenate(read_chunks(path, options))
 
 
 def read_trajectory(
     path: str | Path, sample_time: float, options: ReadingOptions | None = None
 ) -> tuple[Trajectory, Toolpath]:
-    """Read a time trajectory, resampled linearly at `sample_time` s, and the polyline through its rows.
+    """Read a time trajectory, resampled at `sample_time` s, and the path through its rows.
 
     Raises
     ------

@@ -14,6 +14,7 @@ from cnc_shape.program import XYZ, Motion
 from cnc_shape.units import MICROMETRE, MM_PER_MIN
 
 CHORD_ERROR: Final = 0.9 * MICROMETRE  # of the lines that stand for a curve in a program
+REST: Final = 0.5  # s, before the contour begins
 TITLES: Final = {
     "fan": "Fan: a closed spline of three blades, as lines that leave it by 0.9 um at most",
     "circle20": "Circle of radius 20 mm",
@@ -26,11 +27,12 @@ TITLES: Final = {
 
 
 def program_text(contour: Contour) -> str:
-    """G-code of a contour at the paper's feed, from its start."""
+    """G-code of a contour at the paper's feed."""
     moves = contour.moves(contour.length, CHORD_ERROR)
     here = contour.at(np.zeros(1)).position[0]
-    head = [f"({TITLES[contour.name]})", "G17 G21 G90 G94", "G61", f"G0 {_words('XYZ', here)}"]
-    lines = [*head, f"F{FEED_RATE / MM_PER_MIN:g}"]
+    lines = [f"({TITLES[contour.name]})", "G17 G21 G90 G94", "G64 P0.001", f"F{FEED_RATE / MM_PER_MIN:g}"]
+    if here.any():  # go there as slowly, and rest: the errors of a rapid would be all there is to see
+        lines += [f"G1 {_words('XYZ', here)}", f"G4 P{REST:g}"]
     for motion, target, center in zip(moves.motion, moves.target, moves.center, strict=True):
         changed = np.abs(target - here) > 0.0
         if motion is Motion.ARC:

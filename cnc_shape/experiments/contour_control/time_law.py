@@ -69,10 +69,8 @@ def speed_along(contour: Contour, law: TimeLaw) -> Speed:
 def command(contour: Contour, law: TimeLaw) -> Trajectory:
     """The contour as samples: chords between interpolation points, rest at the end.
 
-    Velocity is that of the chords: at a sample, where two meet, the mean of both; on a contour with corners
-    the arriving one, as the mean of two sides points along neither. Its differences, which are fed forward,
-    are then second differences of the command. Acceleration, of which the loop takes the curvature, is
-    that of the contour itself.
+    Velocity and acceleration, of which the loop takes tangent and curvature, are those of the contour itself.
+    The drives are fed forward the second differences of what they are told, as of any replayed command.
     """
     run = speed_along(contour, law)
     per_chord = round(law.interpolation_period / law.sample_time)
@@ -84,16 +82,15 @@ def command(contour: Contour, law: TimeLaw) -> Trajectory:
     points = contour.at(arc_length).position
     columns: list[FloatArray] = [np.interp(step, ends, column) for column in points.T]
     position = np.column_stack(columns)
-    arriving = np.diff(position, axis=0, prepend=position[:1]) / law.sample_time
-    leaving = np.diff(position, axis=0, append=position[-1:]) / law.sample_time
-    velocity = arriving if contour.corners else 0.5 * (arriving + leaving)
+    velocity, acceleration = _rates(contour, run, law.sample_time * step)
     return Trajectory(
         XYZ,
         law.sample_time,
         frozen(np.interp(step, ends, arc_length)),
         frozen(position),
         frozen(velocity),
-        frozen(_acceleration(contour, run, law.sample_time * step)),
+        frozen(acceleration),
+        replayed=True,
     )
 
 
@@ -110,9 +107,13 @@ def _place(run: Speed, time: FloatArray) -> FloatArray:
     return np.minimum(run.arc_length[row] + since * (run.speed[row] + 0.5 * rate * since), run.arc_length[-1])
 
 
-def _acceleration(contour: Contour, run: Speed, time: FloatArray) -> FloatArray:
+def _rates(contour: Contour, run: Speed, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Velocity and acceleration of the contour itself, (n,3) each."""
     row, since, rate = _span(run, time)
     moving = (time < run.time[-1])[:, None]
-    speed = run.speed[row] + rate * since
+    speed = (run.speed[row] + rate * since)[:, None]
     place = contour.at(_place(run, time))
-    return moving * (rate[:, None] * place.tangent + (speed**2)[:, None] * place.curvature)
+    return (
+        moving * speed * place.tangent,
+        moving * (rate[:, None] * place.tangent + speed**2 * place.curvature),
+    )
