@@ -151,10 +151,9 @@ class _Stage:
         ticks = len(command) if last else max(len(command) - 1, 0)
         if windows is not None:
             ticks = windows.lower.size
-        held = command.cut(slice(ticks, None))
+        now = replace(now, held=command.cut(slice(ticks, None)), windows=places, source=source)
         if ticks == 0:
-            kept = replace(now, held=held, windows=places, source=source)
-            return kept, self._nothing(command.cut(slice(0, 0)))
+            return now, self._nothing(command.cut(slice(0, 0)))
         pose, told = self._told(now, command, ticks)
         if windows is not None:
             refuse_pose(self._joints, pose, command.arc_length, windows, source)
@@ -169,14 +168,11 @@ class _Stage:
             command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
             ran.drive, turn,
         )  # fmt: skip
-        settling = now.settling
+        now = replace(now, ticks=now.ticks + ticks, before=told.reference[ticks - 1 : ticks], inverse=inverse)
         if last:
-            settling = self._settle(now, poses, told, windows, tool[-1:] - position[-1:])
-        done = now.ticks + ticks
-        return SimulationState(
-            now.loop, now.structure, True, held, done, told.reference[ticks - 1 : ticks], inverse, places,
-            source, settling,
-        ), response  # fmt: skip
+            ending = tool[-1:] - position[-1:]
+            now = replace(now, settling=self._settle(now, poses, told, windows, ending))
+        return now, response
 
     def _start(self, command: Trajectory) -> SimulationState:
         if command.sample_time != self._period:
