@@ -94,9 +94,16 @@ def joints_of(machine: Machine, kinematics: Kinematics = CARTESIAN) -> Joints:
     """Joints of a machine whose axes are those of the program, in its order.
 
     Joints without a drive are ideal.
+
+    Raises
+    ------
+    ValueError
+        Drives of joints without the kinematics that they move, or not as many as it has joints.
     """
     names = tuple(axis.name for axis in machine.axes)
     if kinematics == CARTESIAN:
+        if machine.joints:
+            raise ValueError(f"{len(machine.joints)=}: give the kinematics that these joints move")
         return Joints(kinematics, machine.axes, tuple(range(len(names))))
     given = machine.joints or (IdealDrive(),) * len(kinematics.joints)
     own = [Axis(n, LINEAR_DEFAULT, d) for n, d in zip(kinematics.joints, given, strict=True)]

@@ -105,7 +105,7 @@ def make_loop(joints: Joints, control: Control) -> ServoLoop:
 def structure_of(machine: Machine, sample_time: float) -> ServoLoop:
     """What bends behind axes that are moved by others: the modes of ideal drives."""
     still = tuple(replace(axis, drive=IdealDrive()) for axis in machine.axes)
-    return make_loop(joints_of(replace(machine, axes=still)), Control(sample_time))
+    return make_loop(joints_of(replace(machine, axes=still, joints=())), Control(sample_time))
 
 
 def settling_time(joints: Joints, control: Control) -> float:

@@ -162,3 +162,9 @@ def test_five_axes_turn_the_workpiece():
     ideal = simulate(command, Machine("five", axes), Control(T, 20.0), pivot)
     assert_allclose(ideal.position, position, atol=1e-11)
     assert_allclose(ideal.turn, 0.0, atol=1e-7)
+
+
+def test_joints_without_their_kinematics_are_a_wrong_call():
+    command, _ = polygon_run()
+    with pytest.raises(ValueError, match="give the kinematics"):
+        simulate(command, machine(PLANTS), Control(T))
