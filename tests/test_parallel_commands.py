@@ -65,9 +65,14 @@ def test_delay_ends_the_gain(place, capfd, gain, code):
         assert_allclose(largest, 660.0, rtol=0.02)
 
 
-@pytest.mark.parametrize("name", ["printer_corexy.yaml", "trunnion_ac.yaml"])
-def test_bundled_machines_run_a_program(place, capfd, name):
+@pytest.mark.parametrize(
+    ("name", "linear", "turning"),
+    [("printer_corexy.yaml", "q1 q2 q3", ""), ("trunnion_ac.yaml", "x y z", "a c")],
+)
+def test_bundled_machines_run_a_program(place, capfd, name, linear, turning):
     told = answer(capfd, "simulate", "square.nc", "-m", str(bundled(name)))
     for case in told["cases"]:
-        assert 0.0 <= case["contour_rms_um"] < 1000.0
-    assert told["cases"][0]["following_rms_um"]
+        assert 0.0 < case["contour_rms_um"] < 100.0
+        assert list(case["following_rms_um"]) == linear.split()
+        assert list(case.get("following_rms_mdeg", {})) == turning.split()
+        assert ("orientation_max_mdeg" in case) == bool(turning)
