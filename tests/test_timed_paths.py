@@ -70,7 +70,15 @@ def test_rates_at_a_corner_are_those_of_arriving():
     position = np.array([[-2.0, 0, 0], [-1.0, 0, 0], [0, 0, 0], 3.0 * ahead, 6.0 * ahead])
     velocity, acceleration = rates(position, 1.0)
     assert_allclose(velocity[1:4], [[1, 0, 0], [1, 0, 0], 3.0 * ahead], atol=1e-15)
-    assert_allclose(acceleration[1:4], [[0, 0, 0], [2, 0, 0], [0, 0, 0]], atol=1e-15)
+    along = 3.0 * math.cos(turned) - 1.0
+    assert_allclose(acceleration[1:4], [[0, 0, 0], [along, 0, 0], [0, 0, 0]], atol=1e-15)
+
+
+def test_rates_where_the_motion_turns_back_tell_the_whole_acceleration():
+    position = np.array([[0.0, 0, 0], [1, 2, 0], [0, 0, 0], [1, 2, 0]])
+    velocity, acceleration = rates(position, 1.0)
+    assert_allclose(velocity[1:3], [[1, 2, 0], [-1, -2, 0]], atol=1e-15)
+    assert_allclose(acceleration[1:3], [[-2, -4, 0], [2, 4, 0]], atol=1e-15)
 
 
 def test_rates_of_a_bend_below_the_angle_of_a_corner_are_central():

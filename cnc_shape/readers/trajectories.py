@@ -21,8 +21,8 @@ def rates(position: FloatArray, sample_time: float) -> tuple[FloatArray, FloatAr
 
     They are central differences, the mean of the step that arrives at a sample and the one that leaves it:
     exact to the second order, and along the tangent wherever the path bends evenly. A corner has no tangent,
-    and the mean would point along neither side of it. There the velocity is that of arriving, and
-    the acceleration is only what changes the speed: a corner is no curvature.
+    and the mean would point along neither side of it. There the velocity is that of arriving, and the
+    acceleration its part along that: the brake before the corner, but no curvature.
 
     Parameters
     ----------
@@ -41,8 +41,9 @@ def rates(position: FloatArray, sample_time: float) -> tuple[FloatArray, FloatAr
     velocity[1:-1] = 0.5 * (arriving + leaving)
     velocity[1 + corner] = arriving[corner]
     acceleration[1:-1] = (leaving - arriving) / sample_time
-    gain = (speed[1:] / np.where(speed[:-1] > 0.0, speed[:-1], 1.0) - 1.0) / sample_time
-    acceleration[1 + corner, :3] = gain[corner, None] * arriving[corner, :3]
+    along = arriving[corner, :3] / speed[corner, None]
+    braking = (acceleration[1 + corner, :3] * along).sum(axis=1)
+    acceleration[1 + corner, :3] = braking[:, None] * along
     return velocity, acceleration
 
 
