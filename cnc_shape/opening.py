@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +22,11 @@ from cnc_shape.program import Note, Program
 from cnc_shape.readers import ReadingOptions, reading
 from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.readers.trajectories import resample
-from cnc_shape.refusals import refuse_pose
+from cnc_shape.refusals import SAME_PLACE, line_on_toolpath, refuse_pose
 from cnc_shape.smoothing import Smoothing, smoothing
 from cnc_shape.timing import PLAIN, Timing
-from cnc_shape.toolpath import building
+from cnc_shape.toolpath import Toolpath, building
 from cnc_shape.trajectory import Trajectory, join_trajectories
-from cnc_shape.windows import Reach, WindowState, windowing
-
-NOWHERE_ELSE = Reach(0, 0, 0.0)  # a command is where it is
 
 
 @dataclass(slots=True)
@@ -166,8 +164,7 @@ def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterato
     if setup.kinematics == CARTESIAN:
         yield from blocks
         return
-    look = windowing(NOWHERE_ELSE)
-    places: WindowState | None = None
+    near: list[Toolpath] = []  # chunks of the path that the motion has not left
     before: Trajectory | None = None
     first: Timing | None = None
     begun = False
@@ -175,14 +172,21 @@ def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterato
         if not begun:
             first, begun = block.timing, True
         if block.timing == first:
-            command = block.command
-            places, windows = look(places, block.toolpath, command.arc_length, block.last)
-            if len(command):
-                command = command if before is None else join_trajectories([before, command])
+            if block.toolpath is not None and len(block.toolpath):
+                near.append(block.toolpath)
+            if len(block.command):
+                command = block.command if before is None else join_trajectories([before, block.command])
                 joints = joints_of(setup.machine.with_axes(command.axes), setup.kinematics)
-                refuse_pose(joints, joints.pose(command.position), command.arc_length, windows, source)
+                lines = partial(_line_of, near, command)
+                refuse_pose(joints, joints.pose(command.position), lines, source)
                 before = command.cut(slice(-1, None))
+                place = float(command.arc_length[-1]) - SAME_PLACE
+                near = [toolpath for toolpath in near if toolpath.arc_length[-1] >= place]
         yield block
+
+
+def _line_of(near: Sequence[Toolpath], command: Trajectory, row: int) -> int | None:
+    return line_on_toolpath(near, command.position[row], float(command.arc_length[row]))
 
 
 def _watched(blocks: Iterable[Block], motion: OpenMotion) -> Iterator[Block]:

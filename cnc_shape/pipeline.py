@@ -27,6 +27,7 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
+from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import CARTESIAN, joints_of
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.kinematics import Kinematics
@@ -117,6 +118,17 @@ class Observer(Protocol):
     def advance(self, block: Block) -> None:
         """Take the next block."""
         ...
+
+
+def _trial(case: Case, machine: Machine, setup: Setup, recorder: Recorder | None) -> Trial:
+    """Start a case; a loop that is unstable by itself is the machine file's fault, whatever the program."""
+    try:
+        return Trial(case, machine, setup.kinematics, recorder)
+    except InfeasibleError as error:
+        if setup.source and error.source is None:
+            error.source = setup.source
+            error.line, error.column = setup.loop_place or (None, None)
+        raise
 
 
 class Trial:
@@ -243,7 +255,7 @@ def run(
                 for case in cases
             ]
             trials = [
-                Trial(case, machine, setup.kinematics, recorder)
+                _trial(case, machine, setup, recorder)
                 for case, recorder in zip(cases, recorders, strict=True)
             ]
         if record and unshaped and block.toolpath is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +16,13 @@ from cnc_shape.joints import Joints
 from cnc_shape.kinematics import first_refusal
 from cnc_shape.program import ROTARY, unit_of
 from cnc_shape.servo import Ticks
+from cnc_shape.toolpath import Toolpath
 from cnc_shape.windows import Windows
 
 LOOKS_EVERY = 1024  # samples from one look at the loop's stability on the way to the next
+SAME_PLACE = 1e-6  # mm of path, within which a place is that of a move's end: rounding
+
+Lines = Callable[[int], int | None]  # the program's line that a row of a chunk of poses belongs to
 
 
 def check_own_loops(joints: Joints, control: Control) -> None:
@@ -36,7 +41,13 @@ def check_own_loops(joints: Joints, control: Control) -> None:
 
 
 def check_on_the_way(
-    joints: Joints, control: Control, pose: FloatArray, velocity: FloatArray, ticks: int, source: str
+    joints: Joints,
+    control: Control,
+    pose: FloatArray,
+    velocity: FloatArray,
+    ticks: int,
+    lines: Lines,
+    source: str,
 ) -> None:
     """Refuse a cross-coupled loop that is unstable at a pose of the way, before it is simulated there.
 
@@ -50,38 +61,44 @@ def check_on_the_way(
         (n,d) mm/s, of x, y and z first. At rest every direction is looked at.
     ticks
         Number of the first of them.
-    source
-        Name of the program.
+    lines, source
+        Of the program.
 
     Raises
     ------
     InfeasibleError
-        Names pose, direction, the gain and the largest stable one.
+        Names line, pose, direction, the gain and the largest stable one.
     """
-    own = joints.coupled
-    looked = pose[-ticks % LOOKS_EVERY :: LOOKS_EVERY]
+    own, first = joints.coupled, -ticks % LOOKS_EVERY
+    looked = pose[first::LOOKS_EVERY]
     if not len(looked):
         return
-    toward = velocity[-ticks % LOOKS_EVERY :: LOOKS_EVERY, :3]
+    toward = velocity[first::LOOKS_EVERY, :3]
     speed = np.sqrt((toward * toward).sum(axis=1))
     drives = [drive.drive for drive in joints.drives[:own]]
     mine = replace(control, joint_gains=control.joint_gains[:own])
     inverse = joints.inverse_jacobian(frozen(looked))
     moving = speed > 0.0
+    told: list[int] = []
+
+    def place(row: int) -> str:
+        told.append(row)
+        return _place(joints, looked[row])
+
     try:
         if not moving.all():
             still = int(np.argmin(moving))
-            check_poses(
-                drives, mine, inverse[still : still + 1], place=lambda _: _place(joints, looked[still])
-            )
+            check_poses(drives, mine, inverse[still : still + 1], place=lambda _: place(still))
         if moving.any():
-            there = looked[moving]
+            there = np.flatnonzero(moving)
             check_along(
                 drives, mine, inverse[moving], toward[moving] / speed[moving, None],
-                lambda row: _place(joints, there[row]),
+                lambda row: place(int(there[row])),
             )  # fmt: skip
     except InfeasibleError as error:
         error.source = error.source or source or None
+        if error.source and told:
+            error.line = error.line or lines(first + LOOKS_EVERY * told[-1])
         raise
 
 
@@ -93,9 +110,7 @@ def _place(joints: Joints, pose: FloatArray) -> str:
     return f"at {', '.join(at)}"
 
 
-def refuse_pose(
-    joints: Joints, pose: FloatArray, arc_length: FloatArray, windows: Windows, source: str
-) -> None:
+def refuse_pose(joints: Joints, pose: FloatArray, lines: Lines, source: str) -> None:
     """Stop at the first pose that the machine cannot hold.
 
     Parameters
@@ -104,12 +119,8 @@ def refuse_pose(
         Of the machine.
     pose
         (n,p) mm or rad, commanded.
-    arc_length
-        (m,) mm, places of the poses on the path; the last pose is at the last place.
-    windows
-        The path.
-    source
-        Name of the program.
+    lines, source
+        Of the program.
 
     Raises
     ------
@@ -120,17 +131,50 @@ def refuse_pose(
     if refused is None:
         return
     row, reason = refused
-    line = None
-    if windows.path.low.size:
-        place = float(arc_length[min(row, arc_length.size - 1)])
-        found = min(int(np.searchsorted(windows.path.high, place)), windows.path.line.size - 1)
-        line = int(windows.path.line[found])
     raise InfeasibleError(
         f"{reason} {_place(joints, pose[row])}",
         hint="move the part, or check the machine's geometry under kinematics",
         source=source or None,
-        line=line,
+        line=lines(row),
     )
+
+
+def line_in_windows(windows: Windows | None, arc_length: FloatArray, row: int) -> int | None:
+    """Line of the move with XYZ travel that a sample runs on; rows past the last are still there."""
+    if windows is None or not windows.path.low.size:
+        return None
+    place = float(arc_length[min(row, arc_length.size - 1)])
+    found = min(int(np.searchsorted(windows.path.high, place)), windows.path.line.size - 1)
+    return int(windows.path.line[found])
+
+
+def line_on_toolpath(toolpaths: Sequence[Toolpath], position: FloatArray, place: float) -> int | None:
+    """Line of the move that a commanded position belongs to.
+
+    Moves of rotary axes alone have no length: of all moves at the place it is the one nearest the position.
+
+    Parameters
+    ----------
+    toolpaths
+        Consecutive chunks, that of the move among them.
+    position
+        (d,) mm or rad, in the toolpaths' axes.
+    place
+        mm of path.
+    """
+    nearest, line = np.inf, None
+    for toolpath in toolpaths:
+        low, high = toolpath.arc_length[:-1], toolpath.arc_length[1:]
+        here = np.flatnonzero((low <= place + SAME_PLACE) & (high >= place - SAME_PLACE))
+        start, chord = toolpath.start[here], toolpath.end[here] - toolpath.start[here]
+        square = (chord * chord).sum(axis=1)
+        along = ((position - start) * chord).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+        away = position - start - np.clip(along, 0.0, 1.0)[:, None] * chord
+        distance = (away * away).sum(axis=1)
+        if here.size and distance.min() < nearest:
+            nearest = float(distance.min())
+            line = int(toolpath.line[here[int(distance.argmin())]])
+    return line
 
 
 def refuse_divergence(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,7 +23,13 @@ from cnc_shape.controllers.loop import Command, Memory, Poses
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine
-from cnc_shape.refusals import check_on_the_way, check_own_loops, refuse_divergence, refuse_pose
+from cnc_shape.refusals import (
+    check_on_the_way,
+    check_own_loops,
+    line_in_windows,
+    refuse_divergence,
+    refuse_pose,
+)
 from cnc_shape.response import Response
 from cnc_shape.segments import path_table
 from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
@@ -155,11 +162,12 @@ class _Stage:
         if ticks == 0:
             return now, self._nothing(command.cut(slice(0, 0)))
         pose, told = self._told(now, command, ticks)
+        lines = partial(line_in_windows, windows, command.arc_length)
         if windows is not None:
-            refuse_pose(self._joints, pose, command.arc_length, windows, source)
+            refuse_pose(self._joints, pose, lines, source)
         poses, inverse = self._poses(now, pose, ticks)
         if self._coupled:
-            check_on_the_way(self._joints, self._control, pose, told.velocity, now.ticks, source)
+            check_on_the_way(self._joints, self._control, pose, told.velocity, now.ticks, lines, source)
         ran = self._loop.run(now.loop, told, poses, self._path(windows))
         before = now.ticks * self._period
         refuse_divergence(self._joints, told.reference, ran, before, self._period, source)

@@ -76,3 +76,20 @@ def test_bundled_machines_run_a_program(place, capfd, name, linear, turning):
         assert list(case["following_rms_um"]) == linear.split()
         assert list(case.get("following_rms_mdeg", {})) == turning.split()
         assert ("orientation_max_mdeg" in case) == bool(turning)
+
+
+def test_a_pose_on_the_way_of_rotary_axes_alone_has_its_own_line(place, capfd):
+    (place / "turn.nc").write_text("G21 G90 F1200\nG1 X10\nA5\nA-5\nA170\nX0\nM2\n")
+    message = refused(capfd, "simulate", "turn.nc", "-m", "wide.yaml")
+    assert message.startswith("turn.nc:5: error: the pose is singular")
+
+
+def test_an_unstable_loop_is_told_where_its_gains_stand_or_where_the_program_meets_it(place, capfd):
+    text = (place / "wide.yaml").read_text()
+    line = text[: text.index("  sample_time_s")].count("\n") + 1
+    (place / "wild.yaml").write_text(text.replace("position_gain_per_s: 20", "position_gain_per_s: 2500"))
+    message = refused(capfd, "simulate", "square.nc", "-m", "wild.yaml")
+    assert message.startswith(f"wild.yaml:{line}:3: error: the loop of joint q1 is unstable")
+    (place / "wild.yaml").write_text(text.replace("proportional_per_s: 80", "proportional_per_s: 2500"))
+    message = refused(capfd, "simulate", "square.nc", "-m", "wild.yaml")
+    assert message.startswith("square.nc:2: error: the loop is unstable across the path at X 0")

@@ -37,6 +37,7 @@ from cnc_shape.controllers.stability import (
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.experiments.contour_control import rigs
 from cnc_shape.joints import joints_of
+from cnc_shape.kinematics import linear_delta
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine
 from cnc_shape.servo import NO_POSES, PathWindows, make_loop
@@ -392,6 +393,19 @@ def test_pose_and_direction_are_told():
         check_poses(DRIVES, between, poses, PLANE[2:3], place)
     check_along(DRIVES, between, poses[[1 - worst]], PLANE[2:3])
     check_along(DRIVES, between, poses[:0], PLANE[:0])
+
+
+def test_the_direction_told_is_the_one_that_ends_the_gain(monkeypatch):
+    unlike = tuple(FirstOrderLag(tau) for tau in (0.007, 0.021, 0.013))
+    far = Control(T, 10.0, 2, None, CrossCoupling(20_000.0))
+    inverse = linear_delta(150.0, 300.0).inverse_jacobian(np.zeros((1, 3)))
+    everywhere = np.repeat(inverse, len(DIRECTIONS), axis=0)
+    limits = [largest_stable_coupling(unlike, far, inverse, line[None]) for line in DIRECTIONS]
+    for most in (stability.MOST_STATES, 1):  # by poles, by frequency response
+        monkeypatch.setattr(stability, "MOST_STATES", most)
+        with pytest.raises(InfeasibleError) as refused:
+            check_along(unlike, far, everywhere, DIRECTIONS, "direction {}".format)
+        assert f"direction {int(np.argmin(limits))}, moving" in str(refused.value)
 
 
 def test_integral_and_derivative_are_told_to_share_the_limit():

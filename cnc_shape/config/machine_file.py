@@ -107,6 +107,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
         shapers={name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()},
         kinematics_choice=kind,
         kinematics=kinematics,
+        loop_place=_loop_place(tree),
         warnings=tuple(f"{source}:{note.line}: warning: {note.message}" for note in notes),
         source=source,
     )
@@ -214,6 +215,11 @@ def _shaper(source: str, tree: Tree, axis: Axis, choice: ShaperChoice) -> Shaper
         key = key_of(error.argument)
         place, walked = locate(tree, path if key is None else (*path, key))
         refuse(source, place, f"{dotted(walked)}: {error.reason}", error.hint)
+
+
+def _loop_place(tree: Tree) -> tuple[int, int]:
+    place, _ = locate(tree, ("control",))
+    return place.line, place.column
 
 
 def _tools(source: str, tree: Tree, model: MachineModel) -> tuple[Tool, ...]:

@@ -71,6 +71,7 @@ class Setup:
     kinematics: Kinematics = field(default_factory=cartesian, compare=False)
     warnings: tuple[str, ...] = field(default=(), compare=False)
     source: str = field(default="", compare=False)
+    loop_place: tuple[int, int] | None = field(default=None, compare=False)  # line, column of control
 
     @property
     def acting_shapers(self) -> Mapping[str, Shaper]:

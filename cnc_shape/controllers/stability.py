@@ -170,8 +170,8 @@ def _check(
     reserve = _reserve(held, model)
     if reserve.min(initial=1.0) > 0.0:
         return
-    largest = coupling.proportional * _largest_coupling(model)
-    worst = int(reserve.argmin())
+    factor = _largest_coupling(model)
+    largest, worst = coupling.proportional * factor, _first_unstable(model, factor)
     where = "" if alike else f"{_told(place(worst))}, moving along {_direction(tangents[worst])}"
     pid = model.coupling.integral or model.coupling.derivative
     share = " with its integral and derivative" if pid else ""
@@ -242,6 +242,14 @@ def _largest_coupling(model: LoopModel) -> float:
         return not unstable.size
 
     return _largest_factor(stable)
+
+
+def _first_unstable(model: LoopModel, factor: float) -> int:
+    """Row that ends the gains across the path, given the factor by which they may grow."""
+    if model.states > MOST_STATES:
+        return int(largest_factors(with_coupling(model, 0.0), model).argmin())
+    beyond = max((1.0 + 2.0 * GAIN_RESOLUTION) * factor, 1.0 / MOST_GROWTH)
+    return int(pole_radius(with_coupling(model, beyond)).argmax())
 
 
 def _largest_factor(stable: Callable[[float], bool]) -> float:
