@@ -28,7 +28,7 @@ class Joints:
     @property
     def cartesian(self) -> bool:
         """Whether joints are axes."""
-        return self.kinematics.name == CARTESIAN.name
+        return self.kinematics == CARTESIAN
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -39,6 +39,10 @@ class Joints:
     def coupled(self) -> int:
         """Joints that the kinematics moves the tool with; the others stand for themselves."""
         return len(self.kinematics.joints)
+
+    def own(self, pose: FloatArray) -> FloatArray:
+        """Those columns of poses or joints (n,p) that are the kinematics' own, (n,c)."""
+        return frozen(pose[:, : self.coupled])
 
     def pose(self, axes: FloatArray) -> FloatArray:
         """Positions or rates of the program's axes (n,d) as those of a pose (n,p)."""
@@ -56,28 +60,26 @@ class Joints:
         """Joints at poses, (n,j); nan where out of reach."""
         if self.cartesian:
             return pose
-        own = self.coupled
-        return frozen(np.hstack([self.kinematics.inverse(frozen(pose[:, :own])), pose[:, own:]]))
+        joint = self.kinematics.inverse(self.own(pose))
+        return frozen(np.hstack([joint, pose[:, self.coupled :]]))
 
     def inverse_jacobian(self, pose: FloatArray) -> FloatArray:
         """Joint rates per axis rates of the kinematics' own, (n,c,c)."""
-        return frozen(self.kinematics.inverse_jacobian(frozen(pose[:, : self.coupled])))
+        return frozen(self.kinematics.inverse_jacobian(self.own(pose)))
 
     def rates(self, pose: FloatArray, velocity: FloatArray) -> FloatArray:
         """Joint rates (n,j) at poses and their velocities (n,p)."""
         if self.cartesian:
             return velocity
-        own = self.coupled
-        rates = np.einsum("nja,na->nj", self.inverse_jacobian(pose), velocity[:, :own])
-        return frozen(np.hstack([rates, velocity[:, own:]]))
+        rates = np.einsum("nja,na->nj", self.inverse_jacobian(pose), velocity[:, : self.coupled])
+        return frozen(np.hstack([rates, velocity[:, self.coupled :]]))
 
     def forward(self, joint: FloatArray, near: FloatArray) -> FloatArray:
         """Poses (n,p) of joints (n,j), each near a pose."""
         if self.cartesian:
             return joint
-        own = self.coupled
-        pose = self.kinematics.forward(frozen(joint[:, :own]), frozen(near[:, :own]))
-        return frozen(np.hstack([pose, joint[:, own:]]))
+        pose = self.kinematics.forward(self.own(joint), self.own(near))
+        return frozen(np.hstack([pose, joint[:, self.coupled :]]))
 
     def velocity(self, pose: FloatArray, rates: FloatArray) -> FloatArray:
         """Velocities of poses (n,p) whose joints move at `rates` (n,j)."""
@@ -99,7 +101,7 @@ def joints_of(machine: Machine, kinematics: Kinematics = CARTESIAN) -> Joints:
         Drives of joints without the kinematics that they move, or not as many as it has joints.
     """
     names = tuple(axis.name for axis in machine.axes)
-    if kinematics.name == CARTESIAN.name:
+    if kinematics == CARTESIAN:
         if machine.joints:
             raise ValueError(f"{len(machine.joints)=}: give the kinematics that these joints move")
         return Joints(kinematics, machine.axes, tuple(range(len(names))))

@@ -161,7 +161,7 @@ def _noted(chunks: Iterable[Program], notes: list[Note]) -> Iterator[Program]:
 
 def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterator[Block]:
     """Refuse the first commanded pose that the machine cannot hold, with its line, before it goes further."""
-    if setup.kinematics.name == CARTESIAN.name:
+    if setup.kinematics == CARTESIAN:
         yield from blocks
         return
     near: list[Toolpath] = []  # chunks of the path that the motion has not left
@@ -169,7 +169,8 @@ def _within_reach(blocks: Iterable[Block], setup: Setup, source: str) -> Iterato
     first: Timing | None = None
     begun = False
     for block in blocks:
-        first, begun = (first, True) if begun else (block.timing, True)
+        if not begun:
+            first, begun = block.timing, True
         if block.timing == first:
             if block.toolpath is not None and len(block.toolpath):
                 near.append(block.toolpath)

@@ -7,18 +7,27 @@ State of an axis: ``[q, q', d_1, d_1', d_2, d_2', ...]``, drive position and the
 A lag drive, ``q'' = (gain u - q') / time_constant``, holds its input u over the sample: zero-order hold.
 An ideal drive is where it is told to be. Between samples it follows the cubic through commanded position
 and velocity, whose acceleration is linear over the sample; the modes answer that acceleration exactly.
+
+A drive without modes is written down. With x = -T / time_constant (0 for an ideal drive) and the functions
+phi_0 = exp x, phi_k = (phi_{k-1} - 1/(k-1)!) / x,
+
+    q+  = q + T phi_1 q' + b T (phi_2 u + phi_3 (u_end - u))         b = gain T / time_constant, or T
+    q'+ =     phi_0 q' + b   (phi_1 u + phi_2 (u_end - u))
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import exp, factorial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.machine import Axis, FirstOrderLag
+from cnc_shape.machine import Axis, Drive, FirstOrderLag
+
+PHI_TERMS = 18  # of the series of phi_3, whose rest at |x| <= 1 is below 1/21!
 
 
 class Plant(NamedTuple):
@@ -52,20 +61,14 @@ def continuous(axis: Axis) -> tuple[FloatArray, FloatArray]:
 
 
 def discretise(axes: Sequence[Axis], sample_time: float) -> Plant:
-    """Discretise every axis at `sample_time` (s) by one matrix exponential each."""
+    """Discretise every axis at `sample_time` (s), exactly."""
     most = max(2 + 2 * len(axis.modes) for axis in axes)
     transition = np.zeros((len(axes), most, most))
     held, rising = np.zeros((len(axes), most)), np.zeros((len(axes), most))
     for row, axis in enumerate(axes):
-        A, B = continuous(axis)
-        s = B.size
-        # one exponential gives the answers to a step and to a ramp of the input
-        augmented = np.zeros((s + 2, s + 2))
-        augmented[:s, :s], augmented[:s, s], augmented[s, s + 1] = A, B, 1.0 / sample_time
-        answer = np.asarray(expm(augmented * sample_time), dtype=np.float64)
-        transition[row, :s, :s] = answer[:s, :s]
-        held[row, :s] = answer[:s, s]
-        rising[row, :s] = answer[:s, s + 1]
+        s = 2 + 2 * len(axis.modes)
+        answer = _exponential(axis, sample_time) if axis.modes else _written_down(axis.drive, sample_time)
+        transition[row, :s, :s], held[row, :s], rising[row, :s] = answer
     return Plant(
         frozen(transition),
         frozen(held),
@@ -73,3 +76,40 @@ def discretise(axes: Sequence[Axis], sample_time: float) -> Plant:
         frozen_integers([2 + 2 * len(axis.modes) for axis in axes]),
         frozen_integers([not isinstance(axis.drive, FirstOrderLag) for axis in axes]),
     )
+
+
+def _exponential(axis: Axis, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Transition (s,s) and answers (s,) to a step and to a ramp of the input, by one matrix exponential."""
+    A, B = continuous(axis)
+    s = B.size
+    augmented = np.zeros((s + 2, s + 2))
+    augmented[:s, :s], augmented[:s, s], augmented[s, s + 1] = A, B, 1.0 / sample_time
+    answer = np.asarray(expm(augmented * sample_time), dtype=np.float64)
+    return answer[:s, :s], answer[:s, s], answer[:s, s + 1]
+
+
+def _written_down(drive: Drive, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Transition (2,2) and answers (2,) of a drive alone; see the head of this file."""
+    T, x, b = sample_time, 0.0, sample_time
+    if isinstance(drive, FirstOrderLag):
+        x = -T / drive.time_constant
+        b = -x * drive.gain
+    phi = _phi(x)
+    return (
+        np.array([[1.0, T * phi[1]], [0.0, phi[0]]]),
+        b * np.array([T * phi[2], phi[1]]),
+        b * np.array([T * phi[3], phi[2]]),
+    )
+
+
+def _phi(x: float) -> tuple[float, float, float, float]:
+    """phi_0 to phi_3 at x <= 0: from the last down by its series near 0, where the quotients cancel."""
+    if x < -1.0:
+        zero = exp(x)
+        one = (zero - 1.0) / x
+        two = (one - 1.0) / x
+        return zero, one, two, (two - 0.5) / x
+    three = sum(x**k / factorial(k + 3) for k in range(PHI_TERMS))
+    two = 0.5 + x * three
+    one = 1.0 + x * two
+    return 1.0 + x * one, one, two, three

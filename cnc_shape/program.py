@@ -9,9 +9,15 @@ from enum import IntEnum
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
+from cnc_shape.units import DEGREE
 
 XYZ = ("x", "y", "z")
 ROTARY = ("a", "b", "c")  # rad inside
+
+
+def unit_of(axis: str) -> float:
+    """What 1 is inside, of what people write and read along an axis: a millimetre in mm, a degree in rad."""
+    return DEGREE if axis in ROTARY else 1.0
 
 
 class Motion(IntEnum):

@@ -14,10 +14,9 @@ from cnc_shape.controllers.stability import check_along, check_poses, check_stab
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import Joints
 from cnc_shape.kinematics import first_refusal
-from cnc_shape.program import ROTARY
+from cnc_shape.program import ROTARY, unit_of
 from cnc_shape.servo import Ticks
 from cnc_shape.toolpath import Toolpath
-from cnc_shape.units import DEGREE
 from cnc_shape.windows import Windows
 
 LOOKS_EVERY = 1024  # samples from one look at the loop's stability on the way to the next
@@ -107,8 +106,7 @@ def _place(joints: Joints, pose: FloatArray) -> str:
     """Say where a pose is."""
     at: list[str] = []
     for axis, value in zip(joints.kinematics.axes, pose.tolist(), strict=False):
-        rotary = axis in ROTARY
-        at.append(f"{axis.upper()} {value / DEGREE if rotary else value:.6g}{'°' if rotary else ''}")
+        at.append(f"{axis.upper()} {value / unit_of(axis):.6g}{'°' if axis in ROTARY else ''}")
     return f"at {', '.join(at)}"
 
 
@@ -129,7 +127,7 @@ def refuse_pose(joints: Joints, pose: FloatArray, lines: Lines, source: str) -> 
     InfeasibleError
         Names the line, the pose, and the leg that cannot reach or the singularity.
     """
-    refused = None if joints.cartesian else first_refusal(joints.kinematics, _own(joints, pose))
+    refused = None if joints.cartesian else first_refusal(joints.kinematics, joints.own(pose))
     if refused is None:
         return
     row, reason = refused
@@ -177,10 +175,6 @@ def line_on_toolpath(toolpaths: Sequence[Toolpath], position: FloatArray, place:
             nearest = float(distance.min())
             line = int(toolpath.line[here[int(distance.argmin())]])
     return line
-
-
-def _own(joints: Joints, pose: FloatArray) -> FloatArray:
-    return frozen(pose[:, : joints.coupled])
 
 
 def refuse_divergence(

@@ -11,8 +11,8 @@ the joints make of the axes::
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -30,6 +30,7 @@ from cnc_shape.refusals import (
     refuse_divergence,
     refuse_pose,
 )
+from cnc_shape.response import Response
 from cnc_shape.segments import path_table
 from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
 from cnc_shape.toolpath import Toolpath
@@ -38,32 +39,6 @@ from cnc_shape.windows import Reach, Windows, WindowState, foot_reach, windowing
 
 RESIDUAL_PERIODS = 10.0  # of the slowest mode, watched after the end
 SHORTEST_RESIDUAL_TIME = 0.5  # s
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Response:
-    """What drives and tool did under a command: a chunk of samples."""
-
-    command: Trajectory
-    reference: FloatArray  # (n,j) mm or rad, what the drives were told
-    joint: FloatArray  # (n,j) mm or rad, position of the drives
-    position: FloatArray  # (n,d) mm or rad, of the drives through the kinematics
-    tool: FloatArray  # (n,d) mm or rad, drives plus structure
-    drive: FloatArray  # (n,j) mm/s or rad/s, velocity command of the loop
-    turn: FloatArray  # (n,) rad between the tool's direction and what it should be; (0,): it does not turn
-    signals: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
-
-    @property
-    def following_error(self) -> FloatArray:
-        """What the drives were told minus where they are, (n,j) mm or rad."""
-        return self.reference - self.joint
-
-    def summary(self) -> str:
-        """Largest lag and deflection of every axis, in one line."""
-        following = np.abs(self.command.position - self.position).max(axis=0, initial=0.0)
-        deflection = np.abs(self.tool - self.position).max(axis=0, initial=0.0)
-        told = zip(self.command.axes, following.tolist(), deflection.tolist(), strict=True)
-        return "; ".join(f"{axis.upper()} follows to {f:.4g}, bends by {d:.4g}" for axis, f, d in told)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,10 +158,9 @@ class _Stage:
         ticks = len(command) if last else max(len(command) - 1, 0)
         if windows is not None:
             ticks = windows.lower.size
-        held = command.cut(slice(ticks, None))
+        now = replace(now, held=command.cut(slice(ticks, None)), windows=places, source=source)
         if ticks == 0:
-            kept = replace(now, held=held, windows=places, source=source)
-            return kept, self._nothing(command.cut(slice(0, 0)))
+            return now, self._nothing(command.cut(slice(0, 0)))
         pose, told = self._told(now, command, ticks)
         lines = partial(line_in_windows, windows, command.arc_length)
         if windows is not None:
@@ -202,14 +176,11 @@ class _Stage:
             command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
             ran.drive, turn,
         )  # fmt: skip
-        settling = now.settling
+        now = replace(now, ticks=now.ticks + ticks, before=told.reference[ticks - 1 : ticks], inverse=inverse)
         if last:
-            settling = self._settle(now, poses, told, windows, tool[-1:] - position[-1:])
-        done = now.ticks + ticks
-        return SimulationState(
-            now.loop, now.structure, True, held, done, told.reference[ticks - 1 : ticks], inverse, places,
-            source, settling,
-        ), response  # fmt: skip
+            ending = tool[-1:] - position[-1:]
+            now = replace(now, settling=self._settle(now, poses, told, windows, ending))
+        return now, response
 
     def _start(self, command: Trajectory) -> SimulationState:
         if command.sample_time != self._period:
@@ -296,8 +267,7 @@ class _Stage:
         there = self._joints.forward(frozen(joint), pose)
         position = self._joints.axes(there)
         turn = self._joints.kinematics.turn
-        own = self._joints.coupled
-        turned = frozen([]) if turn is None else turn(frozen(pose[:n, :own]), frozen(there[:n, :own]))
+        turned = frozen([]) if turn is None else turn(self._joints.own(pose[:n]), self._joints.own(there[:n]))
         if not self._structure.bends:
             return frozen(position[:n]), frozen(position[:n]), turned
         velocity = self._joints.axes(self._joints.velocity(there, frozen(rate)))

@@ -22,11 +22,12 @@ from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import Block
 from cnc_shape.pipeline import Deviation, deviation
 from cnc_shape.program import ROTARY
+from cnc_shape.response import Response
 from cnc_shape.servo import settling_time
 from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.shapers.shaper import NONE as UNSHAPED
-from cnc_shape.simulation import Response, SimulationState, simulating
+from cnc_shape.simulation import SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
 from cnc_shape.windows import foot_reach
 

@@ -99,17 +99,6 @@ def foot_on_lines(toolpath, point, lower, upper):
     return foot
 
 
-def joint_jacobian(kinematics, pose, step=1e-4):
-    """Joint rates per axis rates at a pose (d,), by central differences."""
-    columns = []
-    for i in range(pose.size):
-        ahead, behind = pose.copy(), pose.copy()
-        ahead[i] += step
-        behind[i] -= step
-        columns.append((kinematics.inverse(ahead[None]) - kinematics.inverse(behind[None]))[0] / (2 * step))
-    return np.column_stack(columns)
-
-
 def estimated(coupling, error, tangent, curvature, tool, toolpath, window):
     """The contour error as a vector from the tool to the path, the way the loop guesses it."""
     kind = coupling.estimator.name
@@ -148,15 +137,15 @@ def servo_loop(command, axes, loop, kinematics=None, drives=None, toolpath=None,
             M[3 + 2 * k] -= mode.participation * M[1]
         systems.append(expm(M * T))
     if kinematics is None:
-        reference, rates = command.position, command.velocity
+        reference, rate = command.position, command.velocity
         jacobians = [np.eye(len(joints))] * n
     else:
         pose, motion = (np.zeros((n, len(kinematics.axes))) for _ in range(2))
         pose[:, : len(axes)], motion[:, : len(axes)] = command.position, command.velocity
         reference = kinematics.inverse(pose)
-        every = [joint_jacobian(kinematics, at) for at in pose]
+        every = [rates(lambda row: kinematics.inverse(row[None])[0], at) for at in pose]
         jacobians = [every[k - k % loop.jacobian_every] for k in range(n)]
-        rates = np.array([J @ v for J, v in zip(every, motion, strict=True)])
+        rate = np.array([J @ v for J, v in zip(every, motion, strict=True)])
     states = [np.zeros(2 + 2 * len(own)) for _, own in zip(joints, modes, strict=False)]
     for state, start in zip(states, reference[0], strict=True):
         state[0] = start
@@ -168,7 +157,7 @@ def servo_loop(command, axes, loop, kinematics=None, drives=None, toolpath=None,
         position.append(q)
         tool.append([state[0] + state[2::2].sum() for state in states])
         after = min(k + 1, n - 1)
-        next_rate = rates[k + 1] if k + 1 < n else 0 * rates[k]
+        next_rate = rate[k + 1] if k + 1 < n else 0 * rate[k]
         phi = reference[k] - q
         speed = np.linalg.norm(command.velocity[k, :3])
         if speed > 0:
@@ -178,7 +167,7 @@ def servo_loop(command, axes, loop, kinematics=None, drives=None, toolpath=None,
         u = (np.array(loop.joint_gains) if loop.joint_gains else loop.position_gain) * phi
         if loop.feedforward:
             mean_v = (reference[after] - reference[k]) / T
-            mean_a = (next_rate - rates[k]) / T
+            mean_a = (next_rate - rate[k]) / T
             for i, drive in enumerate(joints):
                 u[i] += (
                     loop.feedforward.velocity * mean_v[i]
@@ -717,7 +706,7 @@ def tilted(vector, a, c, pivot):
 
 
 def coupled_tick(drives, control, inverse_jacobian, tangent, state):
-    """One tick of the loop around a standing command, contour control section 3, written term by term.
+    """One tick of the loop around a standing command, written term by term.
 
     state: (q, v, integral, error before, commands on their way); all drives lag.
     """

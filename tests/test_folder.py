@@ -20,7 +20,7 @@ from cnc_shape.errors import InfeasibleError, OutputError
 from cnc_shape.recording import Recorder
 from cnc_shape.report.folder import RUNS, Context, default_folder, write_report
 from cnc_shape.report.table import summary_json
-from cnc_shape.simulation import Response
+from cnc_shape.response import Response
 from cnc_shape.trajectory import Trajectory
 
 RUN = make_run(600)

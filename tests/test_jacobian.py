@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from test_machine_file_kinematics import AXES, STEWART
 
 from cnc_shape.cli import run
 from cnc_shape.config import bundled, load_machine
@@ -18,17 +19,7 @@ from cnc_shape.kinematics.cubic_parallel import reciprocal_jacobian
 from cnc_shape.kinematics.cubic_parallel_screws import screw_jacobian_as_printed
 
 CUBE = str(bundled("cubic_parallel.yaml"))
-AXES = "axes: {x: {limits: {velocity_mm_s: 100, acceleration_mm_s2: 1000}}}\n"
 DELTA = "{type: linear_delta, tower_radius_mm: 150, link_length_mm: 300}"
-HEXAPOD = """
-  type: stewart
-  legs:
-    - {base_mm: [190, 50, -300], platform_mm: [60, 50, 0]}
-    - {base_mm: [-50, 190, -300], platform_mm: [10, 80, 0]}
-    - {base_mm: [-140, 140, -300], platform_mm: [-75, 25, 0]}
-    - {base_mm: [-140, -140, -300], platform_mm: [-75, -25, 0]}
-    - {base_mm: [-50, -190, -300], platform_mm: [10, -80, 0]}
-    - {base_mm: [190, -50, -300], platform_mm: [60, -50, 0]}"""
 
 
 def ask(capsys: pytest.CaptureFixture[str], *words: str) -> dict:
@@ -96,7 +87,7 @@ def test_a_delta_at_home_is_held_by_three_links_alike(tmp_path, capsys):
 
 
 def test_a_stewart_platform_agrees_with_central_differences(tmp_path, capsys):
-    said = ask(capsys, "-m", written(tmp_path, HEXAPOD), "--pose", "10,-20,15,3,-4,6")
+    said = ask(capsys, "-m", written(tmp_path, "\n" + STEWART), "--pose", "10,-20,15,3,-4,6")
     assert said["central_difference_error"] < 1e-8
     assert np.shape(said["inverse_jacobian"]) == (6, 6)
 

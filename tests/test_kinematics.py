@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from cnc_shape.arrays import frozen
 from cnc_shape.errors import OptionError
+from cnc_shape.experiments.contour_control.rigs import RAILS
 from cnc_shape.kernels.linear import conditions, solve
 from cnc_shape.kinematics import (
     KINEMATICS,
@@ -36,8 +37,7 @@ from cnc_shape.kinematics.legs import Legs, orientation, twist_jacobian, twist_r
 from cnc_shape.kinematics.reach import BLOCK, condition
 from cnc_shape.kinematics.trunnion_ac import angles_of, tool_direction
 
-TOOL = np.array([0.0, 0.0, -60.0])
-CUBE = cubic_rails(60.0, 300.0, TOOL)
+CUBE, TOOL = RAILS, RAILS.tool_offset
 PIVOT = np.array([12.0, -7.0, -80.0])
 
 
@@ -197,7 +197,7 @@ def test_a_slider_moves_with_the_platform_along_its_rail():
     assert_allclose(joints[2:], 300.0 - np.sqrt(300.0**2 - 5.0**2), atol=1e-12)
 
 
-def test_condition_of_the_cube():  # spec of the experiment: 2.68 .. 4.69 over 2000 random poses
+def test_condition_of_the_cube():  # a prototype: 2.68 .. 4.69 over 2000 random poses
     weight = np.diag([1, 1, 1, 1 / 60, 1 / 60, 1 / 60])
     number = [
         np.linalg.cond(reciprocal_jacobian(CUBE, *pose) @ weight)

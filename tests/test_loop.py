@@ -12,7 +12,9 @@ from paths import line, rows, toolpath
 from cnc_shape.arrays import frozen
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Feedforward, Form
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.kinematics import corexy, cubic_parallel, cubic_rails, linear_delta, trunnion_ac
+from cnc_shape.experiments.contour_control import rigs
+from cnc_shape.experiments.contour_control.rigs import PLANTS
+from cnc_shape.kinematics import corexy, linear_delta, trunnion_ac
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, Machine
 from cnc_shape.modes import Mode
@@ -22,14 +24,7 @@ from cnc_shape.windows import Reach
 
 T = 1e-3
 LIMITS = Limits(1000.0, 10_000.0)
-PLANTS = tuple(
-    FirstOrderLag(tau, gain)
-    for tau, gain in (
-        (0.0153, 0.9930), (0.0142, 0.9982), (0.0160, 0.9755), (0.0126, 1.0029), (0.0138, 1.0004),
-        (0.0151, 0.9901),
-    )
-)  # fmt: skip
-CUBIC = cubic_parallel(cubic_rails(60.0, 300.0, frozen([0.0, 0.0, -60.0])))
+CUBIC = rigs.CUBIC.kinematics
 MACHINES = {
     "cartesian": (None, None),
     "corexy": (corexy(), PLANTS[:3]),
@@ -103,14 +98,11 @@ def test_streamed_equals_whole_bit_for_bit(name, chunk):
     arrived = 0
     for low in range(0, len(command), chunk):
         high = min(low + chunk, len(command))
-        coming = None
-        if arrived < len(pieces) and command.arc_length[high - 1] >= path.arc_length[arrived]:
-            while arrived < len(pieces) and command.arc_length[high - 1] >= path.arc_length[arrived]:
-                nothing = part(command, low, low)
-                state, out = step(state, pieces[arrived], nothing, False)
-                parts.append(out)
-                arrived += 1
-        state, out = step(state, coming, part(command, low, high), high == len(command))
+        while arrived < len(pieces) and command.arc_length[high - 1] >= path.arc_length[arrived]:
+            state, out = step(state, pieces[arrived], part(command, low, low), False)
+            parts.append(out)
+            arrived += 1
+        state, out = step(state, None, part(command, low, high), high == len(command))
         parts.append(out)
     whole_state, whole = step(None, path, command, True)
     for field in ("reference", "joint", "position", "tool", "drive", "turn"):

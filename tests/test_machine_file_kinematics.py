@@ -18,6 +18,7 @@ from cnc_shape.config.kinematics import kinematics_of, rails_of
 from cnc_shape.config.setup import KinematicsChoice, Setup
 from cnc_shape.controllers import CrossCoupling, Estimator, Feedforward
 from cnc_shape.errors import CncShapeError, OptionError
+from cnc_shape.experiments.contour_control.rigs import PLANTS
 from cnc_shape.kinematics import KINEMATICS
 from cnc_shape.machine import FirstOrderLag, IdealDrive
 
@@ -325,7 +326,7 @@ def test_the_cubic_machine_is_that_of_paper_004() -> None:
     setup = load_machine(bundled("cubic_parallel.yaml"))
     tau = [0.0153, 0.0142, 0.0160, 0.0126, 0.0138, 0.0151]
     gain = [0.9930, 0.9982, 0.9755, 1.0029, 1.0004, 0.9901]
-    assert setup.machine.joints == tuple(map(FirstOrderLag, tau, gain))
+    assert setup.machine.joints == PLANTS == tuple(map(FirstOrderLag, tau, gain))
     assert setup.kinematics_choice.options == {
         "half_width_mm": 60.0, "link_length_mm": 300.0, "tool_offset_mm": [0.0, 0.0, -60.0],
     }  # fmt: skip

@@ -18,7 +18,7 @@ from cnc_shape.errors import InfeasibleError, OutputError
 from cnc_shape.kernels.extremes import sample_measures
 from cnc_shape.recording import PICKS, Outline, Recorder, Signals
 from cnc_shape.recording.extremes import Extremes
-from cnc_shape.simulation import Response
+from cnc_shape.response import Response
 from cnc_shape.trajectory import Trajectory
 from cnc_shape.writers import spool
 

@@ -35,18 +35,17 @@ from cnc_shape.controllers.stability import (
     largest_stable_position_gain,
 )
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.experiments.contour_control import rigs
 from cnc_shape.joints import joints_of
-from cnc_shape.kinematics import cubic_parallel, cubic_rails, linear_delta
+from cnc_shape.kinematics import linear_delta
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine
 from cnc_shape.servo import NO_POSES, PathWindows, make_loop
 
 T = 1e-3
 LIMITS = Limits(1000.0, 10_000.0)
-TAU = (0.0153, 0.0142, 0.0160, 0.0126, 0.0138, 0.0151)  # s, paper 004, table 1
-GAIN = (0.9930, 0.9982, 0.9755, 1.0029, 1.0004, 0.9901)
-DRIVES = tuple(FirstOrderLag(tau, gain) for tau, gain in zip(TAU, GAIN, strict=True))
-CUBIC = cubic_parallel(cubic_rails(60.0, 300.0, np.array([0.0, 0.0, -60.0])))
+DRIVES = rigs.PLANTS
+CUBIC = rigs.CUBIC.kinematics
 AT = CUBIC.inverse_jacobian(np.array([[20.0, 15.0, 0.0, 0.0, 0.0, 0.0]]))
 CARTESIAN = np.eye(3)[None]
 X, Y, Z = np.eye(3)
@@ -324,7 +323,7 @@ def test_a_very_long_delay_is_judged_in_the_time_of_a_short_one():
     """The drive is an integrator to it, and the delay d T leaves a gain of pi/2 / (d T + tau + T/2)."""
     loop = Control(T, 1.0, 500, None, CrossCoupling(0.1))
     check_stability(axes(*DRIVES[:3]), loop)
-    law = 0.5 * np.pi / (500 * T + TAU[0] + 0.5 * T) / GAIN[0]
+    law = 0.5 * np.pi / (500 * T + DRIVES[0].time_constant + 0.5 * T) / DRIVES[0].gain
     assert_allclose(largest_stable_position_gain(DRIVES[0], loop), law, rtol=2e-3)
     with pytest.raises(InfeasibleError, match="across the path"):
         check_stability(axes(*DRIVES[:3]), replace(loop, cross_coupling=CrossCoupling(2.1)))

@@ -142,8 +142,7 @@ def _check(file: str, options: ReadingOptions, points: str | None) -> dict[str, 
 
 
 def _result(opened: Reading, census: Census) -> dict[str, Any]:
-    from cnc_shape.program import ROTARY
-    from cnc_shape.units import DEGREE
+    from cnc_shape.program import unit_of
 
     empty = not census.low[0] <= census.high[0]
     return {
@@ -164,7 +163,7 @@ def _result(opened: Reading, census: Census) -> dict[str, Any]:
             "max": None if empty else census.high.tolist(),
         },
         "final_position": {
-            axis: float(value) / (DEGREE if axis in ROTARY else 1.0)
+            axis: float(value) / unit_of(axis)
             for axis, value in zip(census.axes, census.position, strict=True)
         },
         "warnings": [{"line": note.line, "message": note.message} for note in census.notes],

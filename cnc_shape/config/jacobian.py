@@ -14,9 +14,8 @@ from cnc_shape.kinematics import Kinematics, Rails
 from cnc_shape.kinematics.cubic_parallel import reciprocal_jacobian
 from cnc_shape.kinematics.cubic_parallel_screws import screw_jacobian
 from cnc_shape.kinematics.legs import orientation
-from cnc_shape.kinematics.reach import first_refusal
-from cnc_shape.program import ROTARY
-from cnc_shape.units import DEGREE
+from cnc_shape.kinematics.reach import first_refusal, weights
+from cnc_shape.program import ROTARY, unit_of
 
 STEP = 1e-4  # of central differences: mm, and rad by the machine's own weight of a radian
 
@@ -73,27 +72,24 @@ def _pose(kinematics: Kinematics, given: Sequence[float]) -> FloatArray:
         raise OptionError(reason, hint=f"give {told}, in mm and degrees", argument="pose")
     pose = np.zeros((1, len(names)))
     pose[0, : len(given)] = given
-    return frozen(pose * [DEGREE if name in ROTARY else 1.0 for name in names])
+    return frozen(pose * [unit_of(name) for name in names])
 
 
 def _outside(names: Sequence[str], values: FloatArray) -> dict[str, float]:
     """Positions by name, in mm and degrees."""
     pairs = zip(names, values.tolist(), strict=True)
-    return {name: value / DEGREE if name in ROTARY else value for name, value in pairs}
+    return {name: value / unit_of(name) for name, value in pairs}
 
 
 def _weighed(kinematics: Kinematics, inverse: FloatArray) -> FloatArray:
     """An inverse Jacobian (j,d) in mm per mm alone."""
-    rows, columns = (
-        np.array([kinematics.radian if name in ROTARY else 1.0 for name in names])
-        for names in (kinematics.joints, kinematics.axes)
-    )
-    return inverse * rows[:, None] / columns
+    rows, columns = weights(kinematics)
+    return inverse * rows[:, None] * columns
 
 
 def _difference(kinematics: Kinematics, axes: FloatArray, inverse: FloatArray) -> float:
     """Largest difference from central differences, relative to the largest entry."""
-    steps = np.array([STEP / kinematics.radian if name in ROTARY else STEP for name in kinematics.axes])
+    steps = STEP * weights(kinematics)[1]
     there, back = (kinematics.inverse(frozen(axes + sign * np.diag(steps))) for sign in (1.0, -1.0))
     numerical = ((there - back) / (2.0 * steps[:, None])).T
     return _apart(_weighed(kinematics, numerical), _weighed(kinematics, inverse))

@@ -15,6 +15,7 @@ from cnc_shape.config.models import (
 )
 from cnc_shape.config.setup import KinematicsChoice
 from cnc_shape.config.yaml_tree import Tree, refuse
+from cnc_shape.joints import CARTESIAN
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Drive, FirstOrderLag, IdealDrive
 
@@ -45,7 +46,7 @@ def read_joints(
         Drives of joints on a Cartesian machine, of axes that joints move, or not as many as there are joints.
     """
     names = ", ".join(kinematics.joints)
-    if kinematics.name == "cartesian":
+    if kinematics == CARTESIAN:
         if model.joints is not None:
             reason = "joints: the joints of a cartesian machine are its axes"
             refuse(source, key_place(tree, ("joints",)), reason, "give every axis its drive:")

@@ -16,10 +16,9 @@ from cnc_shape.controllers.stability import (
     largest_stable_coupling,
 )
 from cnc_shape.joints import joints_of
+from cnc_shape.kinematics.reach import CONDITION_LIMIT, condition
 from cnc_shape.machine import FirstOrderLag
 from cnc_shape.units import DEGREE
-
-SINGULAR = 1e12  # -, condition of the Jacobian beyond which home is no pose to judge a loop at
 
 
 def check_loop(setup: Setup) -> dict[str, float | None]:
@@ -41,9 +40,9 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
         home = np.eye(len(axes))[None]
     else:
         axes = joints.drives[: joints.coupled]
-        home = joints.inverse_jacobian(np.zeros((1, len(axes))))
-        home = home[np.isfinite(home).all(axis=(1, 2))]
-        home = home[np.linalg.cond(home) < SINGULAR]
+        origin = np.zeros((1, len(axes)))
+        held = condition(joints.kinematics, origin)[0] <= CONDITION_LIMIT
+        home = joints.inverse_jacobian(origin)[held]
         check_poses([axis.drive for axis in axes], control, home)
     drives = [axis.drive for axis in axes]
     if not len(home) or not any(isinstance(drive, FirstOrderLag) for drive in drives):

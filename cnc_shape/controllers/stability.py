@@ -28,13 +28,12 @@ from cnc_shape.controllers.loop_model import (
 from cnc_shape.controllers.margins import largest_factors
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import Axis, Drive, FirstOrderLag
-from cnc_shape.program import ROTARY
+from cnc_shape.program import ROTARY, XYZ
 
 GAIN_RESOLUTION = 1e-5  # -, of the largest stable gain that is told
 MOST_STATES = 120  # of a loop whose poles are computed
 GROWTH = 1.5  # -, of the gain from one look to the next, upwards
 MOST_GROWTH = 1e6  # -, beyond which a gain has no end; its inverse is as good as none
-LINEAR = ("x", "y", "z")
 HINT = "lower position_gain_per_s or cross_coupling.proportional_per_s, or sample faster"
 
 Place = Callable[[int], str]  # index of a pose -> where that is, in words: "at x 20, y 15"
@@ -66,7 +65,7 @@ def check_stability(axes: Sequence[Axis], control: Control) -> None:
         Names what is unstable, its gain and the largest stable one.
     """
     axes, control = cartesian_loop(axes, control)
-    names = [f"{'axis' if axis.name in (*LINEAR, *ROTARY) else 'joint'} {axis.name}" for axis in axes]
+    names = [f"{'axis' if axis.name in (*XYZ, *ROTARY) else 'joint'} {axis.name}" for axis in axes]
     drives = [axis.drive for axis in axes]
     _check(names, drives, control, *_everywhere(np.eye(len(drives))[None], DIRECTIONS), _nowhere)
 
@@ -132,8 +131,8 @@ def cartesian_loop(axes: Sequence[Axis], control: Control) -> tuple[tuple[Axis, 
     """
     gains = dict(zip((axis.name for axis in axes), control.joint_gains, strict=False))
     by_name = {axis.name: axis for axis in axes}
-    lines = tuple(by_name.get(name, Axis(name, UNBOUNDED)) for name in LINEAR)
-    ordered = (*lines, *(axis for axis in axes if axis.name not in LINEAR))
+    lines = tuple(by_name.get(name, Axis(name, UNBOUNDED)) for name in XYZ)
+    ordered = (*lines, *(axis for axis in axes if axis.name not in XYZ))
     if not gains:
         return ordered, control
     in_order = tuple(gains.get(axis.name, control.position_gain) for axis in ordered)
@@ -274,5 +273,5 @@ def _direction(tangent: FloatArray) -> str:
     """Say a direction: along x, or along (0.71, 0.71, 0)."""
     axis = int(np.abs(tangent).argmax())
     if abs(tangent[axis]) > 1.0 - 1e-9:
-        return LINEAR[axis]
+        return XYZ[axis]
     return "(" + ", ".join(f"{part + 0.0:.2g}" for part in np.round(tangent, 4)) + ")"

@@ -1,3 +1,4 @@
+# pyright: basic
 """What limits the motion along a path as a whole: chords between interpolation points, and acceleration.
 
 Curvature. With ``q'`` quadratic in s, ``q' x q''`` is quadratic as well, so
@@ -15,7 +16,6 @@ Acceleration. The speed along the path changes by ``q' . (q' a + q'' x) / |q'|``
 Both sides are polynomials of degree 4, so five inequalities linear in (a, x0) suffice. t is the direction
 half-way between the ends of the cell: what a cell that turns by w loses is 1 - cos(w/2) at most.
 """
-# pyright: basic
 
 import numpy as np
 
@@ -187,7 +187,6 @@ def along_bounds(h, d1, d2, e1, e2, limit, first, base, slope):
     product = np.zeros(4)  # q' . q''
     share = np.zeros(3)  # t . q'
     norm = 0.0
-    bend = 0.0
     for i in range(d):
         norm += (d1[i] + e1[i]) ** 2
     norm = np.sqrt(norm)

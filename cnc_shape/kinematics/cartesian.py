@@ -6,8 +6,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.kinematics.kinematics import Kinematics
-
-AXES = ("x", "y", "z")
+from cnc_shape.program import XYZ
 
 
 def _same(values: FloatArray) -> FloatArray:
@@ -24,4 +23,4 @@ def _unity(axes: FloatArray) -> FloatArray:
 
 def cartesian() -> Kinematics:
     """Return the kinematics whose joints are its axes."""
-    return Kinematics("cartesian", AXES, AXES, forward=_there, inverse=_same, inverse_jacobian=_unity)
+    return Kinematics("cartesian", XYZ, XYZ, forward=_there, inverse=_same, inverse_jacobian=_unity)

@@ -6,6 +6,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kinematics.kinematics import Kinematics, rows
+from cnc_shape.program import XYZ
 
 MOTORS = frozen([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -26,4 +27,4 @@ def _rates(axes: FloatArray) -> FloatArray:
 
 def corexy() -> Kinematics:
     """Return the kinematics of a CoreXY machine with a drive of its own for z."""
-    return Kinematics("corexy", ("x", "y", "z"), ("q1", "q2", "q3"), _axes, _motors, _rates)
+    return Kinematics("corexy", XYZ, ("q1", "q2", "q3"), _axes, _motors, _rates)

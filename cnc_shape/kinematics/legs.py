@@ -9,8 +9,9 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kernels.kinematics_legs import jacobians_of, joints_of, poses_of, turns_of
 from cnc_shape.kinematics.kinematics import Kinematics, rows
+from cnc_shape.program import ROTARY, XYZ
 
-AXES = ("x", "y", "z", "a", "b", "c")
+AXES = (*XYZ, *ROTARY)
 JOINTS = ("q1", "q2", "q3", "q4", "q5", "q6")
 TOLERANCE = 1e-11  # mm, of the joints of a pose that has been found from them
 ROUNDING = 1e-14  # the same, relative to the size of the machine, where that is more

@@ -10,6 +10,7 @@ from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.errors import OptionError
 from cnc_shape.kernels.kinematics_delta import carriage_rates, carriages, hanging
 from cnc_shape.kinematics.kinematics import Kinematics, rows
+from cnc_shape.program import XYZ
 
 TOWER_ANGLES = (pi / 2, 7 * pi / 6, 11 * pi / 6)  # rad: 90, 210 and 330 degrees
 LEAST_SPREAD = 1e-6  # area of the towers' triangle over the square of their radius
@@ -68,4 +69,4 @@ def linear_delta(
         carriage_rates(rows(axes, 3), tower, length, rates)
         return rates
 
-    return Kinematics("linear_delta", ("x", "y", "z"), ("q1", "q2", "q3"), forward, inverse, inverse_jacobian)
+    return Kinematics("linear_delta", XYZ, ("q1", "q2", "q3"), forward, inverse, inverse_jacobian)

@@ -47,12 +47,12 @@ def condition(kinematics: Kinematics, axes: FloatArray) -> tuple[FloatArray, Flo
     reach, the number is nan.
     """
     number, determinant = np.empty(len(axes)), np.empty(len(axes))
-    conditions(frozen(kinematics.inverse_jacobian(axes)), *_weights(kinematics), number, determinant)
+    conditions(frozen(kinematics.inverse_jacobian(axes)), *weights(kinematics), number, determinant)
     return number, determinant
 
 
-def _weights(kinematics: Kinematics) -> tuple[FloatArray, FloatArray]:
-    """Weights of joints and of axes, (d,) each."""
+def weights(kinematics: Kinematics) -> tuple[FloatArray, FloatArray]:
+    """Factors of the rows and columns of an inverse Jacobian, (d,) each, that make its entries mm per mm."""
     mm = kinematics.radian
     rows = frozen([mm if name in ROTARY else 1.0 for name in kinematics.joints])
     columns = frozen([1.0 / mm if name in ROTARY else 1.0 for name in kinematics.axes])

@@ -12,8 +12,9 @@ from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kernels.kinematics_trunnion import machine_positions, machine_rates, workpiece_positions
 from cnc_shape.kinematics.kinematics import Kinematics, rows
 from cnc_shape.kinematics.legs import triple_rows
+from cnc_shape.program import XYZ
 
-NAMES = ("x", "y", "z", "a", "c")
+NAMES = (*XYZ, "a", "c")
 UPRIGHT = 1e-12  # rad of tilt up to which the direction does not tell c
 
 

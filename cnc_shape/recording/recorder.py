@@ -11,7 +11,7 @@ from cnc_shape.contour import ContourError
 from cnc_shape.kernels.extremes import sample_measures
 from cnc_shape.recording.extremes import BUCKETS, Extremes
 from cnc_shape.recording.signals import ERRORS, MOTIONS, PICKS, Samples, Signals, columns, require_finite
-from cnc_shape.simulation import Response
+from cnc_shape.response import Response
 from cnc_shape.writers.spool import Spool
 
 KEPT = 2_000_000  # samples of a case that are all kept, unless all are asked for

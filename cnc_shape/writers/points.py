@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray
-from cnc_shape.program import ROTARY, XYZ, Motion, Program
+from cnc_shape.program import ROTARY, XYZ, Motion, Program, unit_of
 from cnc_shape.toolpath import rotary_travel, travel_lengths
 from cnc_shape.units import DEGREE, MM_PER_MIN
 
@@ -23,7 +23,7 @@ def points_of(program: Program) -> dict[str, FloatArray | IntArray]:
     moves = program.motion != Motion.DWELL
     end = np.zeros((len(program), len(POINT_AXES)))
     for column, axis in enumerate(program.axes):
-        end[:, POINT_AXES.index(axis)] = program.target[:, column] / (DEGREE if axis in ROTARY else 1.0)
+        end[:, POINT_AXES.index(axis)] = program.target[:, column] / unit_of(axis)
     length = travel_lengths(program)
     alone = (length == 0.0) & (rotary_travel(program) > 0.0)
     feed = np.where(np.isfinite(program.feed_rate), program.feed_rate, 0.0) / MM_PER_MIN

@@ -19,11 +19,10 @@ from cnc_shape.experiments.contour_control.laws import (
     fed,
     foot,
 )
-from cnc_shape.experiments.contour_control.rigs import CARTESIAN, CUBIC, Rig, errors
+from cnc_shape.experiments.contour_control.rigs import CARTESIAN, CUBIC, SHOWN, Rig, errors
 from cnc_shape.experiments.experiment import Row, Table
 from cnc_shape.units import DEGREE, MILLISECOND
 
-SHOWN: Final = 0.005  # µm
 BETTER_ON: Final = ("fan", "circle20", "circle5", "corner, through", "helix")
 DIRECTIONS: Final = frozen(
     [[np.cos(angle), np.sin(angle), 0.0] for angle in np.arange(0.0, 3.1, np.pi / 4.0)]

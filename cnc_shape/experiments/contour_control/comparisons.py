@@ -10,6 +10,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.contour import contour_error
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Form
+from cnc_shape.controllers.estimators import SMALLEST_CURVATURE
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.experiments.contour_control.laws import (
     COMMON,
@@ -23,12 +24,20 @@ from cnc_shape.experiments.contour_control.laws import (
     tangent,
     variants,
 )
-from cnc_shape.experiments.contour_control.rigs import CARTESIAN, CUBIC, PLANTS, TRIALS, Rig, errors, run
+from cnc_shape.experiments.contour_control.rigs import (
+    CARTESIAN,
+    CUBIC,
+    PLANTS,
+    SHOWN,
+    TRIALS,
+    Rig,
+    errors,
+    run,
+)
 from cnc_shape.experiments.contour_control.time_law import TimeLaw
 from cnc_shape.experiments.experiment import Row, Table
 from cnc_shape.units import MICROMETRE
 
-SHOWN: Final = 0.005  # µm, digits of errors that the paper does not print
 SWEPT: Final = (0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 80.0, 160.0, 320.0, 640.0)  # Kc, 1/s
 KEPT: Final = (1, 10, 100, 1000)  # samples
 FROZEN: Final = 10**6
@@ -159,7 +168,7 @@ def _by_circle(
 ) -> FloatArray:
     """From the tool to the circle of curvature at the command, in the plane; `straight` where it is none."""
     bend_v2 = (curvature**2).sum(axis=1, keepdims=True)
-    curved = bend_v2 > 1e-12
+    curved = bend_v2 > SMALLEST_CURVATURE**2
     safe = np.where(curved, bend_v2, 1.0)
     arm = tool - (command + curvature / safe)
     size = np.linalg.norm(arm, axis=1, keepdims=True)
@@ -171,7 +180,7 @@ def policy_table() -> Table:
     shown = {
         "tangent, Kc 10": PAPER,
         "foot point, Kc 80": foot(HIGH),
-        "feedforward, foot point, Kc 80": foot(HIGH, fed(COMMON)),
+        BEST: COMPARED[BEST],
     }
     rows = [
         error_row(f"{name}, every {every} samples" if every < FROZEN else f"{name}, only at the start",

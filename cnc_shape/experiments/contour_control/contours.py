@@ -68,10 +68,8 @@ class Contour:
     at: Callable[[FloatArray], Places]  # arc length (n,) mm -> points
     corners: tuple[float, ...]  # mm, places where the direction jumps
     closed: bool
-    moves: Callable[
-        [float, float], Moves
-    ]  # as a program has it up to a place, mm, curves as lines that leave
-    # them by an error, mm
+    # up to a place, mm, as a program has it: curves as lines that leave them by no more than an error, mm
+    moves: Callable[[float, float], Moves]
 
     def toolpath(self) -> Toolpath:
         """The contour as programmed: lines and arcs exact, other curves as fine lines.
@@ -176,9 +174,7 @@ def curve(name: str, of: Callable[[FloatArray, int], FloatArray], knots: FloatAr
         first, second = of(w, 1), of(w, 2)
         speed_v2 = (first**2).sum(axis=1)[:, None]
         curvature = second / speed_v2 - first * ((first * second).sum(axis=1)[:, None] / speed_v2**2)
-        return Places(
-            _in_space(of(w, 0)), _in_space(first / np.sqrt(speed_v2)), _in_space(curvature)
-        )  # fmt: skip
+        return Places(_in_space(of(w, 0)), _in_space(first / np.sqrt(speed_v2)), _in_space(curvature))
 
     def moves(until: float, chord_error: float) -> Moves:
         ends = laid_out(length, chord_ends(at, length, chord_error)[1:-1].tolist(), until)

@@ -8,20 +8,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.experiments.contour_control.rigs import CUBIC, PLANTS, RAILS
+from cnc_shape.experiments.contour_control.rigs import CUBIC, PLANTS, RAILS, SHOWN
 from cnc_shape.experiments.experiment import Row, Table
+from cnc_shape.joints import joints_of
 from cnc_shape.kinematics.cubic_parallel import reciprocal_jacobian
 from cnc_shape.kinematics.cubic_parallel_screws import (
     origin_jacobian,
     screw_jacobian,
     screw_jacobian_as_printed,
 )
-from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis
 from cnc_shape.plant import discretise
 
 EXACT: Final = 1e-9  # what a closed form and a computed number that agree may differ by
-SHOWN: Final = 0.005  # of numbers that the paper does not print
 PRINTED: Final = 5e-4  # what is shown of a number that cannot be rounding
 POSES: Final = 50
 REACH, TILT = 60.0, 0.25  # mm, rad: of the poses tried
@@ -122,11 +120,7 @@ def estimate_table() -> Table:
 
 def drives_table() -> Table:
     """Section 4: Table 1."""
-    limits = Limits(velocity=np.inf, acceleration=np.inf)
-    names = [f"q{k}" for k in range(1, len(PLANTS) + 1)]
-    plant = discretise(
-        [Axis(name, limits, drive) for name, drive in zip(names, PLANTS, strict=True)], SAMPLE_TIME
-    )
+    plant = discretise(joints_of(CUBIC.machine, CUBIC.kinematics).drives, SAMPLE_TIME)
     decay, answer = plant.transition[:, 1, 1], plant.held[:, 1]
     rows: list[Row] = []
     for k, (drive, a, b) in enumerate(zip(PLANTS, decay.tolist(), answer.tolist(), strict=True), 1):

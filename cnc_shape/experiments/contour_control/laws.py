@@ -13,7 +13,7 @@ POSITION_GAIN: Final = 20.0  # 1/s
 PAPERS_GAIN: Final = 10.0  # 1/s, half the position gain: where the paper's estimator is at its best
 HIGH: Final = 80.0  # 1/s, a cross-coupling gain that leaves the loop well damped
 INTEGRAL, DERIVATIVE = 800.0, 1.16  # 1/s^2, -
-LAG: Final = 0.0145  # s, what a derivative makes up for
+STEEP: Final = 0.0145 * 95.0  # -, derivative of a PD: the lag of a drive, s, times 95 1/s
 
 COMMON: Final = Feedforward(1.0, 1.0, model_time_constant=0.0148, model_gain=1.0)  # one model for all drives
 OWN: Final = Feedforward(1.0, 1.0)  # each drive's own
@@ -22,21 +22,14 @@ VELOCITY: Final = Feedforward(1.0, 0.0, model_gain=1.0)  # velocity alone
 INDEPENDENT: Final = Control(position_gain=POSITION_GAIN)
 
 
-def coupled(
-    proportional: float, estimator: Estimator, integral: float = 0.0, derivative: float = 0.0
-) -> CrossCoupling:
-    """Cross-coupling of the contour error as a vector."""
-    return CrossCoupling(proportional, estimator, integral, derivative)
-
-
 def tangent(gain: float, base: Control = INDEPENDENT) -> Control:
     """`base` with the paper's estimator."""
-    return replace(base, cross_coupling=coupled(gain, Estimator.TANGENT))
+    return replace(base, cross_coupling=CrossCoupling(gain, Estimator.TANGENT))
 
 
 def foot(gain: float, base: Control = INDEPENDENT, integral: float = 0.0, derivative: float = 0.0) -> Control:
     """`base` with the nearest point of the contour itself."""
-    return replace(base, cross_coupling=coupled(gain, Estimator.FOOT_POINT, integral, derivative))
+    return replace(base, cross_coupling=CrossCoupling(gain, Estimator.FOOT_POINT, integral, derivative))
 
 
 def fed(feedforward: Feedforward, base: Control = INDEPENDENT) -> Control:
@@ -71,15 +64,15 @@ def variants(plants: Sequence[FirstOrderLag], gain: float) -> Mapping[str, Contr
         "tangent, Kc 40": tangent(40.0, alone),
         "foot point, Kc 40": foot(40.0, alone),
         "foot point, Kc 80": foot(HIGH, alone),
-        "foot point, PD": foot(HIGH, alone, 0.0, LAG * 95.0),
+        "foot point, PD": foot(HIGH, alone, 0.0, STEEP),
         "foot point, PI": foot(HIGH, alone, INTEGRAL),
         "foot point, PID": foot(HIGH, alone, INTEGRAL, DERIVATIVE),
-        "circle of curvature, Kc 80": replace(alone, cross_coupling=coupled(HIGH, Estimator.CIRCLE)),
+        "circle of curvature, Kc 80": replace(alone, cross_coupling=CrossCoupling(HIGH, Estimator.CIRCLE)),
         "velocity feedforward": fast,
         "velocity feedforward, tangent, Kc 40": tangent(40.0, fast),
         "velocity feedforward, tangent, Kc 80": tangent(HIGH, fast),
         "velocity feedforward, tangent, PID": replace(
-            fast, cross_coupling=coupled(HIGH, Estimator.TANGENT, INTEGRAL, DERIVATIVE)
+            fast, cross_coupling=CrossCoupling(HIGH, Estimator.TANGENT, INTEGRAL, DERIVATIVE)
         ),
         "velocity feedforward, foot point, Kc 80": foot(HIGH, fast),
         "velocity feedforward, foot point, PID": foot(HIGH, fast, INTEGRAL, DERIVATIVE),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -19,11 +19,12 @@ from cnc_shape.kinematics import Kinematics, cartesian, cubic_parallel, cubic_ra
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, Machine
 from cnc_shape.program import XYZ
-from cnc_shape.simulation import Response, simulate
+from cnc_shape.response import Response
+from cnc_shape.simulation import simulate
 from cnc_shape.toolpath import Toolpath
 from cnc_shape.trajectory import Trajectory
 from cnc_shape.units import MICROMETRE
-from cnc_shape.windows import foot_windows
+from cnc_shape.windows import LOOPS_AHEAD, LOOPS_BACK, MARGIN, foot_windows
 
 PLANTS: Final = tuple(  # Table 1 of the paper
     FirstOrderLag(time_constant, gain)
@@ -32,14 +33,10 @@ PLANTS: Final = tuple(  # Table 1 of the paper
         (0.0151, 0.9901),
     )
 )  # fmt: skip
-MEAN_PLANT: Final = FirstOrderLag(
-    sum(plant.time_constant for plant in PLANTS) / len(PLANTS),
-    sum(plant.gain for plant in PLANTS) / len(PLANTS),
-)
 HALF_WIDTH, LINK_LENGTH, TOOL_OFFSET = 60.0, 300.0, (0.0, 0.0, -60.0)  # mm
 RAILS: Final = cubic_rails(HALF_WIDTH, LINK_LENGTH, frozen(TOOL_OFFSET))
 NO_LIMIT: Final = Limits(velocity=np.inf, acceleration=np.inf)
-BACK, AHEAD, MARGIN = 4.0, 1.5, 0.5  # of 1/Kp, of 1/Kp, mm: how far from the command the contour is searched
+SHOWN: Final = 0.005  # half the last digit shown of numbers that the paper does not print
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +55,8 @@ class Motion:
     contour: Contour
     command: Trajectory
     toolpath: Toolpath
-    lower: FloatArray
-    upper: FloatArray
+    lower: FloatArray  # (n,) mm of path
+    upper: FloatArray  # (n,) mm of path
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -81,14 +78,12 @@ class Result:
         return self.error.max / MICROMETRE
 
 
-def axes_with(plants: Sequence[FirstOrderLag]) -> tuple[Axis, ...]:
-    """X, Y and Z on `plants`."""
-    return tuple(Axis(name, NO_LIMIT, plant) for name, plant in zip(XYZ, plants, strict=True))
-
-
-CARTESIAN: Final = Rig("cartesian", Machine("cartesian", axes_with(PLANTS[:3])), cartesian())
-MEAN: Final = Rig(
-    "cartesian, all axes alike", Machine("mean plant", axes_with([MEAN_PLANT] * 3)), cartesian()
+CARTESIAN: Final = Rig(
+    "cartesian",
+    Machine(
+        "cartesian", tuple(Axis(name, NO_LIMIT, plant) for name, plant in zip(XYZ, PLANTS[:3], strict=True))
+    ),
+    cartesian(),
 )
 CUBIC: Final = Rig(
     "cubic",
@@ -103,7 +98,7 @@ def motion(name: str, law: TimeLaw, gain: float) -> Motion:
     contour = contours()[name]
     told = command(contour, law)
     lag = 1.0 / (gain * law.sample_time)  # samples
-    lower, upper = foot_windows(told.arc_length, round(BACK * lag), round(AHEAD * lag), MARGIN)
+    lower, upper = foot_windows(told.arc_length, round(LOOPS_BACK * lag), round(LOOPS_AHEAD * lag), MARGIN)
     return Motion(contour, told, contour.toolpath(), frozen(lower), frozen(upper))
 
 

@@ -22,12 +22,11 @@ from cnc_shape.experiments.contour_control.comparisons import (
 from cnc_shape.experiments.contour_control.contours import FEED_RATE, contours
 from cnc_shape.experiments.contour_control.equations import drives_table, estimate_table, jacobian_table
 from cnc_shape.experiments.contour_control.laws import INDEPENDENT, PAPER, POSITION_GAIN, tangent
-from cnc_shape.experiments.contour_control.rigs import CARTESIAN, CUBIC, SMOOTH, errors, motion, run
+from cnc_shape.experiments.contour_control.rigs import CARTESIAN, CUBIC, SHOWN, SMOOTH, errors, motion, run
 from cnc_shape.experiments.contour_control.time_law import speed_along
 from cnc_shape.experiments.experiment import Row, Table
 from cnc_shape.units import MICROMETRE
 
-SHOWN: Final = 0.005  # digits of numbers that the paper does not print
 ROUNDED: Final = 0.02  # µm, by which the radius within a chord may fall short of that at its start
 
 

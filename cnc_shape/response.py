@@ -1,0 +1,37 @@
+"""Response: what a machine's drives and tool make of a command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cnc_shape.arrays import FloatArray
+from cnc_shape.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Response:
+    """What drives and tool did under a command: a chunk of samples."""
+
+    command: Trajectory
+    reference: FloatArray  # (n,j) mm or rad, what the drives were told
+    joint: FloatArray  # (n,j) mm or rad, position of the drives
+    position: FloatArray  # (n,d) mm or rad, of the drives through the kinematics
+    tool: FloatArray  # (n,d) mm or rad, drives plus structure
+    drive: FloatArray  # (n,j) mm/s or rad/s, velocity command of the loop
+    turn: FloatArray  # (n,) rad between the tool's direction and what it should be; (0,): it does not turn
+    signals: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+
+    @property
+    def following_error(self) -> FloatArray:
+        """What the drives were told minus where they are, (n,j) mm or rad."""
+        return self.reference - self.joint
+
+    def summary(self) -> str:
+        """Largest lag and deflection of every axis, in one line."""
+        following = np.abs(self.command.position - self.position).max(axis=0, initial=0.0)
+        deflection = np.abs(self.tool - self.position).max(axis=0, initial=0.0)
+        told = zip(self.command.axes, following.tolist(), deflection.tolist(), strict=True)
+        return "; ".join(f"{axis.upper()} follows to {f:.4g}, bends by {d:.4g}" for axis, f, d in told)
