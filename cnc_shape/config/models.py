@@ -120,7 +120,7 @@ class PlanningModel(Strict):
     stop_dwell_shaper_durations: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
     align: bool = True
     tool_tolerance_mm: Annotated[float, Field(ge=1e-5, le=100.0)] | None = None
-    path_acceleration_mm_s2: Positive | None = None
+    path_acceleration_mm_s2: Annotated[float, Field(ge=1e-3, le=1e9)] | None = None
     interpolation_period_s: Annotated[float, Field(ge=1e-6, le=1.0)] | None = None
     chord_error_mm: Annotated[float, Field(ge=1e-6, le=100.0)] | None = None
 
