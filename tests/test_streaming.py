@@ -54,7 +54,7 @@ def fingerprint(chunks, setup, case):
     for block in moving(chunks, setup.machine, planning.path_tolerance, period, [case.timing]):
         if trial is None or mark is None:
             mark = Fingerprint()
-            trial = Trial(case, setup.machine.with_axes(block.command.axes), mark)
+            trial = Trial(case, setup.machine.with_axes(block.command.axes), setup.kinematics, mark)
         trial.advance(block)
     return mark.digests(), trial.summary()
 
