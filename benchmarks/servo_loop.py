@@ -15,16 +15,22 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.measuring import Kind, Row, best_of, not_built, report, workshop
 from benchmarks.motions import LIMITS, SAMPLE_TIME, command
 from cnc_shape.arrays import frozen
+from cnc_shape.contour import contour_error
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Feedforward
+from cnc_shape.controllers.loop import Command, Poses
 from cnc_shape.feedrate import plan
+from cnc_shape.joints import Joints, joints_of
 from cnc_shape.kinematics import cubic_parallel, cubic_rails
 from cnc_shape.machine import Axis, FirstOrderLag, Machine
 from cnc_shape.plant import discretise
 from cnc_shape.readers import read_program
+from cnc_shape.segments import path_table, segments
+from cnc_shape.servo import PathWindows, ServoLoop, make_loop
 from cnc_shape.simulation import simulate, simulating
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import Toolpath, build_toolpath
 from cnc_shape.trajectory import BLOCK, Trajectory, sample
+from cnc_shape.windows import foot_windows
 
 BLOCKS = 50_000
 STEPS = 20_000  # of the loop in Python
@@ -98,20 +104,32 @@ def parallel_rows() -> Iterator[Row]:
             np.linalg.solve(matrix, error)
 
     peer = best_of(2, peer_run) / len(matrices)
+    windows = foot_windows(motion.arc_length, 201, 76, 0.5)
+    sought = PathWindows(path_table(segments(path, first=True)), *(frozen(side) for side in windows))
     for name, estimator in (("tangent", Estimator.TANGENT), ("foot point", Estimator.FOOT_POINT)):
         control = Control(SAMPLE_TIME, GAIN, 0, Feedforward(1.0, 1.0), CrossCoupling(COUPLING, estimator))
+        joints = joints_of(SIX, PARALLEL)
+        loop = make_loop(joints, control)
 
-        def run(control: Control = control) -> None:
-            simulate(motion, SIX, control, PARALLEL, path)
+        def alone(joints: Joints = joints, loop: ServoLoop = loop) -> None:
+            """References, Jacobians and ticks; no forward kinematics, no contour error."""
+            reference, rates = joints.inverse(poses), joints.rates(poses, joints.pose(motion.velocity))
+            told = Command(motion.position, motion.velocity, motion.acceleration, reference, rates)
+            every = Poses(joints.inverse_jacobian(poses), 0, 1)
+            loop.run(loop.start(reference[0]), told, every, sought)
 
-        run()
-        ours = best_of(ROUNDS, run) / steps
-        stage = f"cross-coupled loop, 6 axes, Jacobian each step, {name}, with forward kinematics"
-        yield Row(stage, Kind.SHARE, 0.5, "numpy.linalg.solve", "ns/step", ours * 1e9, peer * 1e9)
-        yield Row(
-            f"the same, {name}, in times real time", Kind.SPEED_UP, 120.0, "real time", "ns/step",
-            ours * 1e9, SAMPLE_TIME * 1e9,
-        )  # fmt: skip
+        def whole(control: Control = control) -> None:
+            response = simulate(motion, SIX, control, PARALLEL, path)
+            contour_error(response.position, path, *windows)
+
+        for how, work, budget in (("alone", alone, 250.0), ("with its contour error", whole, 120.0)):
+            work()
+            ours = best_of(ROUNDS, work) / steps
+            stage = f"six legs, Jacobian each step, {name}, {how}"
+            if how == "alone":
+                yield Row(stage, Kind.SHARE, 0.5, "numpy.linalg.solve", "ns/step", ours * 1e9, peer * 1e9)
+            period = SAMPLE_TIME * 1e9
+            yield Row(stage, Kind.SPEED_UP, budget, "the motion itself", "ns/step", ours * 1e9, period)
 
 
 def rows() -> Iterator[Row]:
