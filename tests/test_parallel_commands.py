@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from answers import answer, refused
@@ -10,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from cnc_shape.cli import run
 from cnc_shape.config.bundled import bundled
+from cnc_shape.motion import moving
 
 SQUARE = "G21 G90 G64 P0.01\nG1 X20 F1200\nY20\nX0\nY0\nM2\n"
 
@@ -93,3 +95,25 @@ def test_an_unstable_loop_is_told_where_its_gains_stand_or_where_the_program_mee
     (place / "wild.yaml").write_text(text.replace("proportional_per_s: 80", "proportional_per_s: 2500"))
     message = refused(capfd, "simulate", "square.nc", "-m", "wild.yaml")
     assert message.startswith("square.nc:2: error: the loop is unstable across the path at X 0")
+
+
+def test_the_way_through_a_singular_pose_is_seen_across_blocks(place, capfd, monkeypatch):
+    """At 1000 deg/s no sample comes near the singularity: it lies between two of them, and of two blocks."""
+
+    def one_by_one(*given):
+        for block in moving(*given):
+            if not len(block.command):
+                yield block
+            for k in range(len(block.command)):
+                last = block.last and k == len(block.command) - 1
+                toolpath = block.toolpath if k == 0 else None
+                yield replace(block, toolpath=toolpath, command=block.command.cut(slice(k, k + 1)), last=last)
+
+    text = (place / "wide.yaml").read_text()
+    turning = "  a: {limits: {velocity_deg_s: 1000, acceleration_deg_s2: 100000}}\n"
+    (place / "quick.yaml").write_text(text.replace("\njoints:", turning + "\njoints:"))
+    (place / "turn.nc").write_text("G21 G90 F60000\nG1 X10\nA170\nX0\nM2\n")
+    whole = refused(capfd, "simulate", "turn.nc", "-m", "quick.yaml")
+    assert whole.startswith("turn.nc:3: error: the way to the pose leads through a singular one")
+    monkeypatch.setattr("cnc_shape.opening.moving", one_by_one)
+    assert refused(capfd, "apply", "turn.nc", "-m", "quick.yaml", "-o", "out.csv") == whole
