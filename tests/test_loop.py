@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import naive
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from paths import line, rows, toolpath
 
 from cnc_shape.arrays import frozen
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Feedforward, Form
+from cnc_shape.controllers.stability import largest_stable_coupling
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.experiments.contour_control import rigs
 from cnc_shape.experiments.contour_control.rigs import PLANTS
@@ -180,3 +183,31 @@ def test_an_error_of_ten_metres_is_a_loop_that_diverged():
     before = command.cut(slice(0, round(time / T)))
     response = simulate(before, machine(None), control, toolpath=path, reach=REACH)
     assert 2e3 < np.abs(response.following_error).max() <= 1e4
+
+
+def test_a_loop_that_becomes_unstable_on_the_way_is_refused_there():
+    """Unlike drives on a delta: at the end of the way a third of the gain is stable that is at its start."""
+    drives = (FirstOrderLag(0.03), FirstOrderLag(0.005), FirstOrderLag(0.005))
+    kinematics, direction = linear_delta(150.0, 300.0), np.array([0.0, 1.0, -1.0]) / np.sqrt(2.0)
+    place = 100.0 * np.clip(np.arange(3000) / 2600, 0.0, 1.0)
+    position = [0.0, -60.0, 0.0] + place[:, None] * direction
+    velocity = np.gradient(position, axis=0) / T
+    velocity[0] = 0.0
+    command = Trajectory(
+        ("x", "y", "z"), T, frozen(place), frozen(position), frozen(velocity), frozen(0 * velocity)
+    )
+    first, final = kinematics.inverse_jacobian(frozen(position[[0, -1]]))[:, None]
+    base = Control(T, 20.0, 2)
+    least = largest_stable_coupling(drives, base, final, frozen(direction[None]))
+    assert least < 0.4 * largest_stable_coupling(drives, base, first)
+    path = toolpath(line(*position[-1]), start=tuple(position[0]))
+
+    def run(gain):
+        return simulate(
+            command, machine(drives), replace(base, cross_coupling=CrossCoupling(gain)), kinematics, path
+        )
+
+    with pytest.raises(InfeasibleError, match="unstable across the path at X 0, Y -") as refused:
+        run(1.5 * least)
+    assert refused.value.line == 1
+    run(0.95 * least)
