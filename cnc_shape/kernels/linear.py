@@ -7,6 +7,16 @@ from cnc_shape.kernels import kernel
 
 
 @kernel
+def pivot_row(work, k):
+    """Row from k on with the largest magnitude in column k of `work` (n,n); the first of equals."""
+    pivot = k
+    for i in range(k + 1, work.shape[0]):
+        if abs(work[i, k]) > abs(work[pivot, k]):
+            pivot = i
+    return pivot
+
+
+@kernel
 def solve(matrix, right, out, work):
     """Solve ``matrix out = right`` by Gaussian elimination with partial pivoting.
 
@@ -20,10 +30,7 @@ def solve(matrix, right, out, work):
             work[i, j] = matrix[i, j]
     determinant = 1.0
     for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(work[i, k]) > abs(work[pivot, k]):
-                pivot = i
+        pivot = pivot_row(work, k)
         if work[pivot, k] == 0.0:
             out[:] = np.nan
             return 0.0
@@ -61,10 +68,7 @@ def invert(matrix, out, work):
         out[i, i] = 1.0
     determinant = 1.0
     for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(work[i, k]) > abs(work[pivot, k]):
-                pivot = i
+        pivot = pivot_row(work, k)
         if work[pivot, k] == 0.0:
             out[:] = np.inf
             return 0.0
