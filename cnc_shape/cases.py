@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from cnc_shape.config.setup import Setup, Shaping
+from cnc_shape.config.setup import CASE_NAMES, Setup, Shaping
 from cnc_shape.controllers import Control
 from cnc_shape.errors import OptionError
 from cnc_shape.pipeline import Case
 from cnc_shape.timing import PLAIN, Slowdown, Timing
 
-KINDS = {"contour_shaped": Shaping.CONTOUR, "axis_shaped": Shaping.AXIS, "path_shaped": Shaping.PATH}
+KINDS = (Shaping.CONTOUR, Shaping.AXIS, Shaping.PATH)  # of shaping, in the order in which they are offered
 
 
 def default_cases(setup: Setup, slowdown: Slowdown | None = None) -> tuple[Case, ...]:
@@ -57,7 +57,7 @@ def _known(setup: Setup) -> dict[str, tuple[Shaping, Control]]:
     if setup.control.cross_coupling is not None:
         known["shaped+cross_coupled" if shaped else "cross_coupled"] = (shaping, setup.control)
     if setup.shapers:
-        known |= {name: (kind, alone) for name, kind in KINDS.items()}
+        known |= {CASE_NAMES[kind]: (kind, alone) for kind in KINDS}
         known["shaped-feedforward"] = (shaping, replace(alone, feedforward=None))
     return known
 

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from cnc_shape.arrays import FloatArray
-from cnc_shape.config.setup import Setup, Shaping
+from cnc_shape.config.setup import CASE_NAMES, Setup, Shaping
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.errors import OptionError
 from cnc_shape.joints import joints_of
@@ -30,13 +30,6 @@ from cnc_shape.shapers.shaper import NONE as UNSHAPED
 from cnc_shape.simulation import SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
 from cnc_shape.windows import foot_reach
-
-KINDS = {
-    Shaping.NONE: "unshaped",
-    Shaping.AXIS: "axis_shaped",
-    Shaping.PATH: "path_shaped",
-    Shaping.CONTOUR: "contour_shaped",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +197,7 @@ class ModelTrial:
 def _timings(setup: Setup) -> dict[Shaping, Timing]:
     """How each kind times the motion; shapers without a common one leave path shaping out."""
     found: dict[Shaping, Timing] = {}
-    for kind in KINDS if setup.shapers else ():
+    for kind in CASE_NAMES if setup.shapers else ():
         try:
             found[kind] = setup.timing(kind)
         except OptionError:
@@ -234,5 +227,7 @@ class Trade:
     def rows(self) -> tuple[TradeRow, ...]:
         """One row a kind; none where the machine has no shapers. Call it after the last block."""
         return tuple(
-            trial.row(KINDS[kind], self._factors[kind]) for kind, trial in self._trials.items() if trial.begun
+            trial.row(CASE_NAMES[kind], self._factors[kind])
+            for kind, trial in self._trials.items()
+            if trial.begun
         )

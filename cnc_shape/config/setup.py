@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Final
 
 from cnc_shape.controllers import Control
 from cnc_shape.kinematics import Kinematics, cartesian
@@ -24,6 +25,14 @@ class Shaping(Enum):
     AXIS = "axis"  # axis commands, each through its own shaper
     PATH = "path"  # the time law along the path
     NONE = "none"  # nothing is shaped, whatever shapers the axes have
+
+
+CASE_NAMES: Final = {  # of the row that shows a kind of shaping by itself
+    Shaping.NONE: "unshaped",
+    Shaping.AXIS: "axis_shaped",
+    Shaping.PATH: "path_shaped",
+    Shaping.CONTOUR: "contour_shaped",
+}
 
 
 @dataclass(frozen=True, slots=True)
