@@ -10,8 +10,9 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.contour import contour_error
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Form
-from cnc_shape.controllers.estimators import SMALLEST_CURVATURE
+from cnc_shape.controllers.estimators import circle_error
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.experiments.contour_control.contours import Places
 from cnc_shape.experiments.contour_control.laws import (
     COMMON,
     COMPARED,
@@ -151,28 +152,26 @@ def estimated(control: Control) -> tuple[FloatArray, dict[str, FloatArray]]:
     true = result.error.foot - response.position[:, :3]
     pose = frozen(np.hstack([command.position, np.zeros_like(command.position)]))
     inverse = CUBIC.kinematics.inverse_jacobian(pose)
-    e = np.linalg.solve(inverse, response.following_error[:, :, None])[:, :3, 0]
+    error = np.linalg.solve(inverse, response.following_error[:, :, None])[:, :3, 0]
+    e = np.ascontiguousarray(error, dtype=np.float64)
     place = told.contour.at(command.arc_length)
     along = (e * place.tangent).sum(axis=1, keepdims=True) * place.tangent
     tool = frozen(command.position - e)
     found = contour_error(tool, told.toolpath, told.lower, told.upper)
     return true, {
         "tangent": e - along,
-        "circle of curvature": _by_circle(command.position, tool, place.curvature, e - along),
+        "circle of curvature": _by_circle(e, place),
         "foot point": found.foot - tool,
     }
 
 
-def _by_circle(
-    command: FloatArray, tool: FloatArray, curvature: FloatArray, straight: FloatArray
-) -> FloatArray:
-    """From the tool to the circle of curvature at the command, in the plane; `straight` where it is none."""
-    bend_v2 = (curvature**2).sum(axis=1, keepdims=True)
-    curved = bend_v2 > SMALLEST_CURVATURE**2
-    safe = np.where(curved, bend_v2, 1.0)
-    arm = tool - (command + curvature / safe)
-    size = np.linalg.norm(arm, axis=1, keepdims=True)
-    return np.where(curved, (1.0 / (np.sqrt(safe) * size) - 1.0) * arm, straight)
+def _by_circle(tracking: FloatArray, place: Places) -> FloatArray:
+    """Estimates by the circle of curvature at the command, as the loop makes them, (n,3) mm."""
+    found = np.empty_like(tracking)
+    frames = np.stack([place.tangent, place.curvature], axis=1)
+    for row, frame, error in zip(tracking, frames, found, strict=True):
+        circle_error(row, frame, error)
+    return found
 
 
 def policy_table() -> Table:

@@ -30,7 +30,7 @@ from cnc_shape.experiments.contour_control.rigs import (
     errors,
     run,
 )
-from cnc_shape.experiments.contour_control.time_law import speed_along
+from cnc_shape.experiments.contour_control.time_law import chord_speeds, speed_along
 from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, look, new_figure, styled
 from cnc_shape.units import MICROMETRE
 
@@ -106,8 +106,7 @@ def fan_and_feed() -> Figure:
     shape.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
     shape.set_title("Fig. 4: fan, 33 points")
     law = speed_along(fan, SMOOTH)
-    radius = 1.0 / np.linalg.norm(fan.at(law.arc_length).curvature, axis=1)
-    allowed = 2.0 * np.sqrt(2.0 * radius * MICROMETRE) / SMOOTH.interpolation_period
+    allowed = chord_speeds(fan, law.arc_length, SMOOTH)
     feed.plot(law.arc_length, np.minimum(allowed, 60.0), **look(1, 0.9), label="allowed by 1 µm, every 8 ms")
     feed.plot(law.arc_length, law.speed, **look(0, 1.3), label="run")
     feed.set(xlim=(0.0, fan.length), ylim=(0.0, 30.0), xlabel="arc length (mm)", ylabel="feed (mm/s)")

@@ -17,6 +17,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen
 from cnc_shape.experiments.contour_control.contours import FEED_RATE, Contour, divided
+from cnc_shape.kernels.path_limits import chord_speed
 from cnc_shape.program import XYZ
 from cnc_shape.trajectory import Trajectory
 
@@ -50,12 +51,7 @@ def speed_along(contour: Contour, law: TimeLaw) -> Speed:
     """Highest speed at every place of a contour."""
     edges = np.array([0.0, *contour.corners, contour.length])
     s = divided(edges, lambda span: ceil(span / SPACING))
-    limit = np.full(s.size, law.feed_rate)
-    bend = np.linalg.norm(contour.at(s).curvature, axis=1)
-    curved = bend > 0.0
-    radius = np.maximum(1.0 / bend[curved], law.chord_error)
-    chord = 2.0 * np.sqrt(radius**2 - (radius - law.chord_error) ** 2)
-    limit[curved] = np.minimum(limit[curved], chord / law.interpolation_period)
+    limit = np.minimum(chord_speeds(contour, s, law), law.feed_rate)
     rest = edges if law.stops else edges[[0, -1]]
     v2 = np.where(np.isin(s, rest), 0.0, limit**2)
     gain = 2.0 * law.acceleration * s
@@ -64,6 +60,13 @@ def speed_along(contour: Contour, law: TimeLaw) -> Speed:
     speed = np.minimum(np.sqrt(np.maximum(v2, 0.0)), limit)  # the sums above round
     time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (speed[:-1] + speed[1:]))])
     return Speed(frozen(s), frozen(limit), frozen(speed), frozen(time))
+
+
+def chord_speeds(contour: Contour, arc_length: FloatArray, law: TimeLaw) -> FloatArray:
+    """Speed that the chord error allows at places of a contour (n,) mm, mm/s; the planner's own law."""
+    bend = np.linalg.norm(contour.at(arc_length).curvature, axis=1)
+    period, error = law.interpolation_period, law.chord_error
+    return np.array([chord_speed(curvature, period, error) for curvature in bend.tolist()])
 
 
 def command(contour: Contour, law: TimeLaw) -> Trajectory:
