@@ -9,7 +9,7 @@ from typing import TypeAlias
 from cnc_shape.limits import Limits
 from cnc_shape.modes import Mode
 from cnc_shape.program import ROTARY
-from cnc_shape.units import DEGREE
+from cnc_shape.units import DEGREE, TWO_PI
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,44 @@ class FirstOrderLag:
     gain: float = 1.0  # -
 
 
-Drive: TypeAlias = IdealDrive | FirstOrderLag
+@dataclass(frozen=True, slots=True)
+class VelocityLoop:
+    """PI velocity control inside a drive, at a tick of its own."""
+
+    bandwidth: float = 400.0  # rad/s, torque gain over nominal inertia
+    integral_time: float = 0.01  # s; inf: no integral
+    sample_time: float = 2.5e-4  # s
+
+
+@dataclass(frozen=True, slots=True)
+class ServoMotor:
+    """A motor with its drive: torque behind a current lag turns an inertia against friction and load.
+
+    ``J w' = T - B w - Tc sign(w) - Td``, ``th' = w``; a screw makes `lead` of every revolution.
+    """
+
+    inertia: float  # kg m^2, of everything that turns
+    torque_limit: float  # N m
+    lead: float  # mm or rad of the axis per revolution
+    viscous: float = 0.0  # N m s
+    coulomb: float = 0.0  # N m
+    current_time_constant: float = 0.0  # s; 0: the current is there at once
+    encoder_counts: int = 0  # per revolution; 0: the encoder is exact
+    velocity_loop: VelocityLoop = VelocityLoop()
+    nominal_inertia: float | None = None  # kg m^2, what the controllers take it for; None: the true one
+
+    @property
+    def pitch(self) -> float:
+        """Of the screw: mm or rad of the axis per rad of the motor."""
+        return self.lead / TWO_PI
+
+    @property
+    def believed_inertia(self) -> float:
+        """What the controllers take the inertia for, kg m^2."""
+        return self.inertia if self.nominal_inertia is None else self.nominal_inertia
+
+
+Drive: TypeAlias = IdealDrive | FirstOrderLag | ServoMotor
 
 LINEAR_DEFAULT = Limits(velocity=200.0, acceleration=2000.0)  # mm/s, mm/s^2
 ROTARY_DEFAULT = Limits(velocity=90.0 * DEGREE, acceleration=900.0 * DEGREE)  # rad/s, rad/s^2

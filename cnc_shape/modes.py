@@ -13,6 +13,16 @@ HIGHEST_FREQUENCY = 1e5  # Hz
 
 
 @dataclass(frozen=True, slots=True)
+class ModeTable:
+    """A mode where an axis stands: linear between the rows, as at the ends beyond them."""
+
+    axis: str  # on whose position the mode depends
+    position: tuple[float, ...]  # (p,) mm or rad, increasing, p >= 2
+    natural_frequency: tuple[float, ...]  # (p,) Hz
+    damping_ratio: tuple[float, ...]  # (p,) -
+
+
+@dataclass(frozen=True, slots=True)
 class Mode:
     """One flexible mode between drive and tool.
 
@@ -30,6 +40,9 @@ class Mode:
     participation: float = 1.0  # -, share of the drive's acceleration that excites the mode
     frequency_uncertainty: float = 0.0  # -, how far off the frequency may be, relative
     damping_uncertainty: float = 0.0  # -, how far off the damping ratio may be, relative
+    table: ModeTable | None = (
+        None  # how it changes over an axis; the mode itself is the shaper's design point
+    )
 
     def __post_init__(self) -> None:
         if (

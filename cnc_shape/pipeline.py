@@ -27,6 +27,7 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.config.setup import Setup
 from cnc_shape.contour import MeasuringState, Tally, measuring, tally
 from cnc_shape.controllers import Control
+from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import CARTESIAN, joints_of
 from cnc_shape.kernels.sums import add_squares
@@ -49,6 +50,7 @@ class Case:
     shaping: CommandShaping
     control: Control
     timing: Timing = PLAIN
+    disturbances: Disturbances = UNDISTURBED
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +152,7 @@ class Trial:
         joints = joints_of(machine, kinematics)
         self._joints = joints.names
         reach = foot_reach(settling_time(joints, case.control), self._longer, period)
-        self._simulate = simulating(machine, case.control, kinematics, reach)
+        self._simulate = simulating(machine, case.control, kinematics, reach, case.disturbances)
         self._measure = measuring(reach)
         self._shaped: CommandState | None = None
         self._simulated: SimulationState | None = None

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MotorSignals:
+    """What the servo motors did, one column for each of them."""
+
+    joints: tuple[str, ...]  # (m,) joints that have a servo motor
+    torque: FloatArray  # (n,m) N m, asked of the motors
+    load: FloatArray  # (n,m) N m, load torque that was injected
+    estimate: FloatArray  # (n,m) N m, the observer's estimate of it; 0 without an observer
+    gain_ratio: FloatArray  # (n,m) -, velocity gain over the nominal one
+    effective_inertia: FloatArray  # (n,m) kg m^2, that the compensation makes of the load
+    agreement: FloatArray  # (n,m) -, -A: how much of the contour error the load's displacement explains
+    inertia: FloatArray  # (n,m) kg m^2, identified; the nominal one without identification
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -22,7 +35,7 @@ class Response:
     tool: FloatArray  # (n,d) mm or rad, drives plus structure
     drive: FloatArray  # (n,j) mm/s or rad/s, velocity command of the loop
     turn: FloatArray  # (n,) rad between the tool's direction and what it should be; (0,): it does not turn
-    signals: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    motors: MotorSignals | None = None  # where any joint has a servo motor
 
     @property
     def following_error(self) -> FloatArray:

@@ -20,6 +20,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers import Control, Estimator
 from cnc_shape.controllers.loop import Command, Memory, Poses
+from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine
@@ -68,7 +69,11 @@ SimulationStep = Callable[
 
 
 def simulating(
-    machine: Machine, control: Control, kinematics: Kinematics = CARTESIAN, reach: Reach | None = None
+    machine: Machine,
+    control: Control,
+    kinematics: Kinematics = CARTESIAN,
+    reach: Reach | None = None,
+    disturbances: Disturbances = UNDISTURBED,
 ) -> SimulationStep:
     """Return the resumable stage that runs a command through a machine's loop and structure.
 
@@ -87,6 +92,8 @@ def simulating(
         What the joints make of the axes.
     reach
         Of the windows in which foot points are sought; None: that of the position loop.
+    disturbances
+        What acts on the servo motors besides.
 
     Raises
     ------
@@ -101,6 +108,7 @@ def simulating(
         control,
         joints,
         reach or foot_reach(settling_time(joints, control), 0.0, control.sample_time),
+        disturbances,
     ).step
 
 
@@ -111,6 +119,7 @@ def simulate(
     kinematics: Kinematics = CARTESIAN,
     toolpath: Toolpath | None = None,
     reach: Reach | None = None,
+    disturbances: Disturbances = UNDISTURBED,
 ) -> Response:
     """Run a whole command through a machine.
 
@@ -120,19 +129,27 @@ def simulate(
         The (shaped) axis commands.
     machine
         Drives and structure; axes it lacks are ideal.
-    control, kinematics, reach
+    control, kinematics, reach, disturbances
         As `simulating`.
     toolpath
         What the command runs on; cross-coupling by foot points needs it.
     """
-    step = simulating(machine.with_axes(command.axes), control, kinematics, reach)
+    step = simulating(machine.with_axes(command.axes), control, kinematics, reach, disturbances)
     return step(None, toolpath, command, True)[1]
 
 
 class _Stage:
     """The stage's settings; all that changes is in the state."""
 
-    def __init__(self, machine: Machine, control: Control, joints: Joints, reach: Reach) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        control: Control,
+        joints: Joints,
+        reach: Reach,
+        disturbances: Disturbances,
+    ) -> None:
+        self._disturbances = disturbances
         self._control, self._joints, self._period = control, joints, control.sample_time
         self._watched = _residual_ticks(machine, control)
         self._loop = make_loop(joints, control)

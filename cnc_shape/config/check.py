@@ -10,9 +10,9 @@ from cnc_shape.config.machine_file import read_content, read_machine
 from cnc_shape.config.yaml_tree import refuse
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import joints_of
-from cnc_shape.machine import FirstOrderLag, IdealDrive
+from cnc_shape.machine import FirstOrderLag, IdealDrive, ServoMotor
 
-DRIVES = {IdealDrive: "ideal", FirstOrderLag: "first_order_lag"}
+DRIVES = {IdealDrive: "ideal", FirstOrderLag: "first_order_lag", ServoMotor: "servo_motor"}
 
 
 def check_machine(path: Path | str) -> dict[str, object]:

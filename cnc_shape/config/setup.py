@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Final
 
 from cnc_shape.controllers import Control
+from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.kinematics import Kinematics, cartesian
 from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
 from cnc_shape.machine import Machine
@@ -76,6 +77,7 @@ class Setup:
     tools: tuple[Tool, ...] = ()
     choices: Mapping[str, ShaperChoice] = field(default_factory=dict[str, ShaperChoice])  # axis: choice
     shapers: Mapping[str, Shaper] = field(default_factory=dict[str, Shaper], compare=False)  # axis: designed
+    disturbances: Disturbances = UNDISTURBED
     kinematics_choice: KinematicsChoice = KinematicsChoice()
     kinematics: Kinematics = field(default_factory=cartesian, compare=False)
     warnings: tuple[str, ...] = field(default=(), compare=False)

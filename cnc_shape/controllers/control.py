@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cnc_shape.controllers.compensation import (
+    DisturbanceObserver,
+    FrictionFeedforward,
+    InertiaCompensation,
+    InertiaIdentification,
+)
 from cnc_shape.controllers.cross_coupling import CrossCoupling
 from cnc_shape.controllers.feedforward import Feedforward
 
@@ -19,3 +25,7 @@ class Control:
     cross_coupling: CrossCoupling | None = None
     jacobian_every: int = 1  # samples for which the loop keeps the Jacobian of a commanded pose
     joint_gains: tuple[float, ...] = ()  # 1/s, position gain of every joint; (): `position_gain` for all
+    disturbance_observer: DisturbanceObserver | None = None  # this and what follows act on servo motors alone
+    inertia_compensation: InertiaCompensation | None = None
+    friction_feedforward: FrictionFeedforward | None = None
+    inertia_identification: InertiaIdentification | None = None
