@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
+from math import cos, pi, sin
 from typing import TypeAlias
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cnc_shape.arrays import FloatArray
 
@@ -116,21 +117,22 @@ def value(profile: Profile, t: FloatArray) -> FloatArray:
             return np.interp(t, profile.times, profile.levels, left=0.0, right=0.0)
 
 
+@cache
 def burst_peak(frequency: float, length: float) -> float:
     """Largest ``|sin(2 pi f t) cos(pi t / length)^2|``.
 
     The window falls from t = 0 on, so the peak lies before the sine's first crest, or within the window where
     that ends sooner. There the logarithm of the burst is concave: it has one stationary point, where
-    ``w cos(w t) cos(p t) = 2 p sin(w t) sin(p t)`` with w = 2 pi f and p = pi / length.
+    ``w cos(w t) cos(p t)`` falls below ``2 p sin(w t) sin(p t)``, with w = 2 pi f and p = pi / length.
     """
-    w, p = 2.0 * np.pi * frequency, np.pi / length
-
-    def slope(t: float) -> float:
-        return float(w * np.cos(w * t) * np.cos(p * t) - 2.0 * p * np.sin(w * t) * np.sin(p * t))
-
-    end = min(0.25 / frequency, 0.5 * length)
-    t = float(brentq(slope, 0.0, end, xtol=1e-15 * end))
-    return float(np.sin(w * t) * np.cos(p * t) ** 2)
+    w, p = 2.0 * pi * frequency, pi / length
+    low, high = 0.0, min(0.25 / frequency, 0.5 * length)
+    while low < (t := 0.5 * (low + high)) < high:
+        if w * cos(w * t) * cos(p * t) > 2.0 * p * sin(w * t) * sin(p * t):
+            low = t
+        else:
+            high = t
+    return sin(w * t) * cos(p * t) ** 2
 
 
 def _burst(burst: SineBurst, t: FloatArray) -> FloatArray:

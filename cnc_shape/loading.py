@@ -106,8 +106,8 @@ class Loading:
     def _torque(self, first: int, direction: FloatArray) -> FloatArray:
         """Torque (rows, ticks, d) from sample number `first` on, by directions (rows, loads, d)."""
         rows = direction.shape[0]
-        sample = np.arange(first, first + rows)[:, None]
-        t = (sample + np.arange(self.ticks) / self.ticks) * self.sample_time
+        sample: FloatArray = np.arange(first, first + rows, dtype=np.float64)[:, None]
+        t: FloatArray = (sample + np.arange(self.ticks) / self.ticks) * self.sample_time
         torque = np.zeros((rows, self.ticks, len(self.axes)))
         for row, load in enumerate(self.loads):
             push = load.peak * value(load.profile, t)
