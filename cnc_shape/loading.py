@@ -7,9 +7,9 @@ no direction, and its loads do not act; at rest the last one holds.
 The frame of an analytic command comes from its velocity and acceleration. A replayed command was given by
 positions, rounded to some digits: its acceleration is mostly rounding. There the turning of the tangent goes
 through two exponential windows of `WINDOW` s, one after the other, which reach into the past alone, and is
-taken for a curve where it agrees over the second one. On a plane curve that costs nothing but the first
-`WINDOW` of every curve, as the normal is set upright on the tangent of the very sample; elsewhere the
-normal turns late by two windows.
+taken for a curve where it agrees over the second one. On a plane curve that costs nothing but its first two
+windows, as the normal is set upright on the tangent of the very sample; on others the normal turns late by
+as much.
 """
 
 from __future__ import annotations

@@ -860,7 +860,7 @@ def path_frames(velocity, acceleration, period, still, share):
                 bend = mean[k - first - 1]
                 bend = bend - (bend @ tangent[k]) * tangent[k]
                 size = np.linalg.norm(bend)
-                if size > 1e-6 * step[k - first - 1] and size**2 > 0.5 * square[k - first - 1]:
+                if size > 1e-6 * step[k - first - 1] and size**2 > 0.7 * square[k - first - 1]:
                     toward[k] = bend / size
     frames, last, normal, bent = np.zeros((n, 3, 3)), None, None, False
     for k in range(n):

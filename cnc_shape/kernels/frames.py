@@ -15,7 +15,7 @@ from cnc_shape.kernels import kernel
 
 STRAIGHT = 1e-6  # 1/mm, less curvature is none: a radius of a kilometre
 ROUNDING = 1e-10  # -, of an acceleration: less of it across the velocity is rounding
-COHERENT = 0.5  # -, share of a window's mean square turning that its mean must make up
+COHERENT = 0.7  # -, of a window's mean square turning, in its mean; a single turn makes 0.65 of it at most
 ALONG_Z = 1e-6  # -, sine of the angle to z below which a path runs along it
 
 # What a frame keeps from one sample to the next
