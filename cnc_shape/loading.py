@@ -111,7 +111,8 @@ class Loading:
         torque = np.zeros((rows, self.ticks, len(self.axes)))
         for row, load in enumerate(self.loads):
             push = load.peak * value(load.profile, t)
-            torque += push[:, :, None] * direction[:, None, row, :]
+            for column in range(len(self.axes)):
+                torque[:, :, column] += push * direction[:, row, column, None]
         return frozen(torque)
 
 

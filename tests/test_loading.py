@@ -231,6 +231,12 @@ def test_the_rounding_of_a_replayed_line_is_no_curve(digits):
         assert np.linalg.norm(turned[1:-1], axis=1).max() < 0.2 * 10.0 ** (3 - digits)
 
 
+def test_a_single_corner_of_a_replayed_path_is_no_curve():
+    whole = joined(straight((1, 0, 0), 200), straight((0, 1, 0), 200))
+    told = command(whole.position, whole.velocity, whole.acceleration, replayed=True)
+    assert_allclose(directions(NORMAL, told)[200:], np.tile((-1.0, 0.0, 0.0), (200, 1)), atol=1e-12)
+
+
 def test_a_replayed_corner_from_rest_is_no_curve():
     whole = joined(straight((1, 0, 0), 200), rest(20), straight((0, 1, 0), 200))
     told = command(whole.position, whole.velocity, whole.acceleration, replayed=True)
