@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.setup import Setup
 from cnc_shape.controllers import Control, CrossCoupling, DisturbanceObserver, GainLaw, InertiaCompensation
+from cnc_shape.controllers.loop import Command
 from cnc_shape.controllers.loop_model import closed_loop, loop_model, loop_transfer, open_loop, poles
 from cnc_shape.controllers.margins import servo_margins, worst_margins
 from cnc_shape.controllers.servo_model import at_ratio, gain_ratios, lifted, torque_transfer, velocity_tick
@@ -31,7 +32,7 @@ from cnc_shape.experiments.contour_control import rigs
 from cnc_shape.joints import joints_of
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine, ServoMotor, VelocityLoop
-from cnc_shape.servo import SLOWEST_LOOP, settling_time
+from cnc_shape.servo import NO_POSES, SLOWEST_LOOP, PathWindows, make_loop, settling_time
 from cnc_shape.units import DEGREE
 
 T = 1e-3
@@ -242,6 +243,60 @@ def test_servo_motors_and_lags_move_a_parallel_kinematics_together(delay):
     for positions in told:
         assert_allclose(state[:6], positions, rtol=0.0, atol=1e-8)
         state = transition @ state
+
+
+# --- the loop's own kernel ------------------------------------------------------------------------
+
+
+def let_go(drives, loop, start, samples):
+    """Positions of the loop itself, told to stand at 0 and let go beside it, (samples, j)."""
+    still = np.zeros((samples + 1, len(drives)))
+    servo = make_loop(joints_of(Machine("m", tuple(axes(*drives)))), loop)
+    ran = servo.run(servo.start(np.array(start)), Command(*[still] * 5), NO_POSES, PathWindows())
+    return ran.joint
+
+
+def linear(motor):
+    """The motor without what is not linear, and without what the kernel splits within a tick."""
+    return replace(
+        motor, coulomb=0.0, encoder_counts=0, torque_limit=1e9, viscous=0.0, current_time_constant=0.0
+    )
+
+
+@pytest.mark.parametrize("observer", OBSERVERS.values(), ids=OBSERVERS)
+@pytest.mark.parametrize(("ratio", "scaled"), [(1.0, False), (2.5, False), (1.7, True)])
+@pytest.mark.parametrize("delay", [0, 2])
+def test_the_model_goes_where_the_kernel_goes(observer, ratio, scaled, delay):
+    loop = compensated(ratio, GainLaw.FIXED, scale_integral_time=scaled)
+    loop = replace(loop, disturbance_observer=observer, delay_samples=delay)
+    drives = (linear(MOTOR), LAG, linear(turning(0.6, lead=4.0)))
+    start = [1.0, -0.5, 0.3]
+    told = let_go(drives, loop, start, 100)
+    transition = closed_loop(loop_model(drives, loop, np.eye(3)[None], X[None]))[0]
+    state = np.zeros(len(transition))
+    state[:3] = start
+    for positions in told:
+        assert_allclose(state[:3], positions, rtol=0.0, atol=1e-9)
+        state = transition @ state
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_the_kernel_decays_and_grows_as_told(share):
+    """The motor as it is but for friction, limit and counts: its lag split from its motion, 3 % off."""
+    motor = replace(MOTOR, coulomb=0.0, encoder_counts=0, torque_limit=1e9)
+    gain = share * largest_stable_position_gain(motor, LOOP)
+    told = np.abs(let_go((motor,), replace(LOOP, position_gain=gain), [1.0], 400))
+    assert (told[300:].max() < told[100:200].max()) == (share < 1.0)
+
+
+@pytest.mark.parametrize(("share", "stable"), [(0.45, True), (0.35, False)])
+def test_the_papers_motor_runs_where_it_is_not_refused(share, stable):
+    """At a ratio of 2.5, let go 0.2 mm beside the command: it settles, or shakes within its torque limit."""
+    motor, loop = turning(share), compensated(2.5, GainLaw.FIXED)
+    told = np.abs(let_go((motor,), loop, [0.2], 4000))
+    assert (closed_poles(motor, loop) < 1.0) == stable
+    assert (told[3000:].max() < 1e-3) == stable
+    assert (told[3000:].max() > 0.01) != stable
 
 
 # --- the loop over frequency ----------------------------------------------------------------------

@@ -31,9 +31,9 @@ from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # s
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers.compensation import DisturbanceObserver, GainLaw, InertiaCompensation
 from cnc_shape.controllers.control import Control
+from cnc_shape.controllers.inertia_compensation import SMALLEST_RATIO
 from cnc_shape.machine import Drive, ServoMotor
 
-LOWEST_LITERAL_RATIO = 0.1  # -, to which the literal readings may lower the gain
 BETWEEN = 8  # steps from the lowest ratio to the highest at which a loop is looked at
 NO_LAG = 1e-6  # -, share of a tick below which a current lag is none
 UNWATCHED = DisturbanceObserver(feedforward=0.0)
@@ -157,7 +157,7 @@ def _ratio_bounds(control: Control) -> tuple[float, float]:
     if term.law is GainLaw.FIXED:
         return largest, largest
     literal = term.law in (GainLaw.LITERAL, GainLaw.LITERAL_INVERSE)
-    return min(LOWEST_LITERAL_RATIO if literal else 1.0, largest), max(largest, 1.0)
+    return min(SMALLEST_RATIO if literal else 1.0, largest), max(largest, 1.0)
 
 
 def _any_motor(drives: Sequence[Drive]) -> bool:
