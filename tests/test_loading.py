@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import MILL, streamed, wander
 from numpy.testing import assert_allclose, assert_array_equal
+from paths import arc, line, toolpath
 
 from cnc_shape.arrays import frozen
 from cnc_shape.disturbances import (
@@ -21,6 +22,7 @@ from cnc_shape.disturbances import (
 )
 from cnc_shape.kernels.frames import FRAME_SIZE, path_frames
 from cnc_shape.loading import STILL, STILL_REPLAYED, WINDOW, loading
+from cnc_shape.program import PathMode
 from cnc_shape.trajectory import Trajectory
 
 NORMAL, TANGENT, BINORMAL = PathDirection.NORMAL, PathDirection.TANGENT, PathDirection.BINORMAL
@@ -197,6 +199,17 @@ def test_rounding_near_rest_is_no_curve(shares):
     assert_allclose(
         directions(NORMAL, whole), np.tile(level / np.linalg.norm(level), (speed.size, 1)), atol=1e-9
     )
+
+
+def test_on_a_planned_circle_the_normal_is_outward():
+    # the planner's curves stand in for the arc within its tolerance, and bend as it does
+    stop = PathMode.EXACT_STOP
+    moves = line(50, 0, 0, mode=stop), arc((50, 0, 0), (0, 0, 0), 2.0 * np.pi, mode=stop)
+    columns, _ = streamed([toolpath(*moves)], MILL)
+    whole = command(*[columns[f"Trajectory.{name}"] for name in ("position", "velocity", "acceleration")])
+    place = columns["Trajectory.arc_length"]
+    round_ = (place > 50.1) & (place < 50.0 + 100.0 * np.pi - 0.1)
+    assert_allclose(directions(NORMAL, whole)[round_], whole.position[round_] / 50.0, atol=3e-3)
 
 
 def test_every_direction_has_unit_length():
