@@ -311,9 +311,11 @@ def test_a_plane_command_has_its_normal_in_the_plane():
     assert not directions(BINORMAL, flat).any()  # across the plane nothing can move
 
 
-def test_a_command_of_other_axes_is_refused():
+def test_a_command_of_other_axes_or_too_few_samples_is_refused():
     with pytest.raises(ValueError, match="axes"):
         steady("x", ("x", "y"))(None, circle(3), 3)
+    with pytest.raises(ValueError, match="rows"):
+        steady("x")(None, circle(3), 4)
 
 
 # --- chunks -------------------------------------------------------------------------------------------
