@@ -14,8 +14,25 @@ from test_machine_file import _key_places, outcome_of, parse, refusal
 
 from cnc_shape.cases import default_cases, pick_cases
 from cnc_shape.config import bundled, check_machine, dump_machine, load_machine
-from cnc_shape.config.disturbance_models import MAX_ROWS
+from cnc_shape.config.compensation_models import (
+    DisturbanceObserverModel,
+    FrictionFeedforwardModel,
+    InertiaCompensationModel,
+    InertiaIdentificationModel,
+)
+from cnc_shape.config.disturbance_models import (
+    MAX_ROWS,
+    EncoderNoiseModel,
+    LoadTorqueModel,
+    PulsesModel,
+    SineBurstModel,
+    StepsModel,
+    TableModel,
+)
+from cnc_shape.config.drive_models import ServoMotorModel, VelocityLoopModel
 from cnc_shape.config.setup import Setup
+from cnc_shape.config.strict import Strict
+from cnc_shape.config.template import machine_template
 from cnc_shape.controllers import (
     Control,
     DisturbanceObserver,
@@ -609,3 +626,42 @@ def test_any_value_anywhere_makes_a_setup_or_one_line(path: tuple[object, ...], 
     else:
         assert parse(dump_machine(outcome)) == outcome
         assert outcome.machine.axes[0].drive != IdealDrive() or not outcome.disturbances
+
+
+# --- what is written about it
+
+
+def uncommented(text: str) -> str:
+    """The template with its examples of motors, terms and loads in place."""
+    begin = ("    # drive:", "  # disturbance_observer:", "# disturbances:")
+    lines, acting = list[str](), False
+    for line in text.replace("    drive: {type: first_order_lag, time_constant_s: 0.012}\n", "").splitlines():
+        acting = line.lstrip().startswith("#") and (acting or line.startswith(begin))
+        lines.append(line.replace("# ", "", 1) if acting else line)
+    return "\n".join(lines)
+
+
+def test_the_examples_in_the_template_are_good() -> None:
+    setup = parse(uncommented(machine_template()))
+    assert isinstance(setup.machine.axis("z").drive, ServoMotor)
+    assert setup.control.disturbance_observer == DisturbanceObserver(300.0, 1.0)
+    assert setup.control.inertia_compensation == InertiaCompensation(2.5, 0.12, 261.0)
+    assert setup.control.friction_feedforward == FrictionFeedforward()
+    assert setup.control.inertia_identification == InertiaIdentification()
+    assert len(setup.disturbances.loads) == 1
+    assert setup.disturbances.noise == EncoderNoise(0.5, 1)
+
+
+SERVO_MODELS = [
+    ServoMotorModel, VelocityLoopModel, DisturbanceObserverModel, InertiaCompensationModel, FrictionFeedforwardModel,
+    InertiaIdentificationModel, LoadTorqueModel, EncoderNoiseModel, SineBurstModel, PulsesModel, StepsModel,
+    TableModel,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("model", SERVO_MODELS, ids=lambda model: model.__name__)
+def test_every_key_is_explained(model: type[Strict]) -> None:
+    pages = Path(__file__).resolve().parent.parent / "docs" / "machine-file.md"
+    told = pages.read_text(encoding="utf-8")
+    for key in model.model_fields:
+        assert key in told
