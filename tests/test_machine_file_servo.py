@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from test_machine_file import _key_places, outcome_of, parse, refusal
 
 from cnc_shape.cases import default_cases, pick_cases
+from cnc_shape.cli import run
 from cnc_shape.config import bundled, check_machine, dump_machine, load_machine
 from cnc_shape.config.compensation_models import (
     DisturbanceObserverModel,
@@ -665,3 +667,25 @@ def test_every_key_is_explained(model: type[Strict]) -> None:
     told = pages.read_text(encoding="utf-8")
     for key in model.model_fields:
         assert key in told
+
+
+# --- from the command line
+
+
+def test_a_fault_in_the_file_of_a_load_ends_the_command_with_its_place(tmp_path: Path, capfd) -> None:
+    machine = with_table(tmp_path, "time_s,torque_nm\n0,0\n1, nan\n")
+    assert run(["check", str(machine)]) == 2
+    told = capfd.readouterr().err
+    assert f"{tmp_path}/loads/load.csv:3:4: error: 'nan' is no number for torque_nm\n" in told
+    assert "hint: write it as 1.5 or 1e-3" in told
+
+
+def test_a_load_from_a_file_reaches_the_motor(tmp_path: Path, capfd) -> None:
+    machine = with_table(tmp_path, "time_s,torque_nm\n0,0\n0.05,1\n0.3,1\n")
+    program = tmp_path / "line.nc"
+    program.write_text("G21 G90\nG1 X2 F600\nM2\n")
+    assert run(["simulate", str(program), "-m", str(machine), "--json"]) == 0
+    calm, disturbed = json.loads(capfd.readouterr().out)["cases"]
+    assert (calm["name"], disturbed["name"]) == ("independent", "independent+disturbed")
+    assert disturbed["following_rms_um"]["x"] > 1.02 * calm["following_rms_um"]["x"]
+    assert disturbed["following_rms_um"]["y"] == calm["following_rms_um"]["y"] == 0.0
