@@ -55,6 +55,7 @@ class Settings(NamedTuple):
     slope: float = 3.32  # rad/s per N m
     friction_coulomb: float = 0.0  # N m, fed forward
     friction_viscous: float = 0.0  # N m s, fed forward
+    friction_lag: float = 1.0 / 44.67  # s, by which the motor is later than its command
     identified: int = 0
     identification_time: float = 1.0  # s
     excitation: float = 200.0  # rad/s^2
@@ -103,7 +104,7 @@ def run(
     forget_squares = s.forgetting ** (sample / 1e-3)
     in_window = 1.0 - exp(-sample / s.window)
     rise, fall = 1.0 - exp(-sample / s.attack), 1.0 - exp(-sample / s.release)
-    lagging = 1.0 - exp(-sample * s.position_gain)
+    lagging = 1.0 - exp(-sample / s.friction_lag) if s.friction_lag > 0.0 else 1.0
     sub = h / s.substeps
     left = exp(-sub / s.current_lag) if s.current_lag > 0.0 else 0.0
 

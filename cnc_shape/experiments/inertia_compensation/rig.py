@@ -1,4 +1,4 @@
-"""The test bed: three axes, each a driving motor coupled to a loading motor, and what a lap of it comes to."""
+"""The test bed: three axes, each a driving motor with a loading motor on its shaft; and laps of it."""
 
 from __future__ import annotations
 
@@ -34,13 +34,14 @@ MOTOR: Final = ServoMotor(
     velocity_loop=VelocityLoop(bandwidth=400.0, integral_time=0.01, sample_time=2.5e-4),
     nominal_inertia=INERTIA,
 )
+CIRCLE: Final = TiltedCircle()
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
     """A lap: the path, the motors of the axes, and what disturbs them."""
 
-    circle: TiltedCircle = TiltedCircle()
+    circle: TiltedCircle = CIRCLE
     motors: tuple[ServoMotor, ...] = (MOTOR, MOTOR, MOTOR)
     disturbances: Disturbances = UNDISTURBED
 

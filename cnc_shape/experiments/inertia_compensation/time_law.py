@@ -1,7 +1,7 @@
 """The paper's path: a circle in space that leans 45 degrees on two axes, and the time law that runs it.
 
-The speed rises to the feed as ``F sin(pi t / 2 ta)^2``, falls likewise at the end, and is constant between, so
-that one lap of a circle of radius R takes ``2 pi R / F + ta``.
+The speed rises to the feed as ``F sin(pi t / 2 ta)^2``, falls likewise at the end, and is constant between:
+one lap of a circle of radius R takes ``2 pi R / F + ta``.
 """
 
 from __future__ import annotations
