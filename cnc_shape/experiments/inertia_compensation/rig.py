@@ -11,7 +11,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers import Control
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
-from cnc_shape.errors import InfeasibleError
+from cnc_shape.experiments.inertia_compensation.loads import BURST_LOAD, PULSE_LOAD
 from cnc_shape.experiments.inertia_compensation.time_law import TiltedCircle, command, off_circle, toolpath
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine, ServoMotor, VelocityLoop
@@ -34,6 +34,7 @@ MOTOR: Final = ServoMotor(
     velocity_loop=VelocityLoop(bandwidth=400.0, integral_time=0.01, sample_time=2.5e-4),
     nominal_inertia=INERTIA,
 )
+SHOWN: Final = 0.005  # half the last digit shown of numbers that the paper does not print
 CIRCLE: Final = TiltedCircle()
 
 
@@ -89,11 +90,26 @@ def run(trial: Trial, control: Control) -> Lap:
     return Lap(response, frozen(off_circle(circle, response.position)))
 
 
+UNLOADED: Final = Trial()
+LOADED: Final = UNLOADED.under(BURST_LOAD)
+PULSED: Final = UNLOADED.under(PULSE_LOAD)
+
+
+@cache
+def lap(trial: Trial, control: Control) -> Lap:
+    """A lap that is looked at more than once."""
+    return run(trial, control)
+
+
 @cache
 def errors(trial: Trial, control: Control) -> tuple[float, float]:
-    """Contour error of a lap, µm: RMS and largest; nan where the loop diverges."""
-    try:
-        lap = run(trial, control)
-    except InfeasibleError:
-        return np.nan, np.nan
-    return lap.rms, lap.max
+    """Contour error of a lap, µm: RMS and largest."""
+    found = run(trial, control)
+    return found.rms, found.max
+
+
+def ripple(found: Lap) -> float:
+    """Standard deviation of what the torque changes by from sample to sample, N m."""
+    motors = found.response.motors
+    assert motors is not None
+    return float(np.diff(motors.torque, axis=0).std())
