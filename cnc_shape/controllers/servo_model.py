@@ -31,10 +31,11 @@ from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # s
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers.compensation import DisturbanceObserver, GainLaw, InertiaCompensation
 from cnc_shape.controllers.control import Control
+from cnc_shape.controllers.inertia_compensation import SMALLEST_RATIO
 from cnc_shape.machine import Drive, ServoMotor
 
-LOWEST_LITERAL_RATIO = 0.1  # -, to which the literal readings may lower the gain
 BETWEEN = 8  # steps from the lowest ratio to the highest at which a loop is looked at
+NO_LAG = 1e-6  # -, share of a tick below which a current lag is none
 UNWATCHED = DisturbanceObserver(feedforward=0.0)
 
 Complex = NDArray[np.complex128]
@@ -156,7 +157,7 @@ def _ratio_bounds(control: Control) -> tuple[float, float]:
     if term.law is GainLaw.FIXED:
         return largest, largest
     literal = term.law in (GainLaw.LITERAL, GainLaw.LITERAL_INVERSE)
-    return min(LOWEST_LITERAL_RATIO if literal else 1.0, largest), max(largest, 1.0)
+    return min(SMALLEST_RATIO if literal else 1.0, largest), max(largest, 1.0)
 
 
 def _any_motor(drives: Sequence[Drive]) -> bool:
@@ -177,15 +178,20 @@ def _gains(motor: ServoMotor, control: Control) -> tuple[float, float]:
 
 def _motion(motor: ServoMotor, h: float) -> FloatArray:
     """What angle, speed and torque grow by over a tick, per speed, torque and torque asked for, (3,3)."""
-    drag, lag = motor.viscous / motor.inertia, motor.current_time_constant
-    if lag == 0.0:
-        rates = np.array([[0.0, 1.0, 0.0], [0.0, -drag, 1.0 / motor.inertia], [0.0, 0.0, 0.0]])
-        grown = np.asarray(expm(rates * h), dtype=np.float64)
-        return np.array([
-            [grown[0, 1], 0.0, grown[0, 2]], [grown[1, 1] - 1.0, 0.0, grown[1, 2]], [0.0, -1.0, 1.0],
-        ])  # fmt: skip
+    lag = motor.current_time_constant
+    return _growth(motor.inertia, motor.viscous, lag if lag > NO_LAG * h else 0.0, h)
+
+
+@lru_cache(maxsize=256)
+def _growth(inertia: float, viscous: float, lag: float, h: float) -> FloatArray:
+    """As `_motion`, exactly."""
     rates = np.zeros((4, 4))
     rates[0, 1] = 1.0
-    rates[1, 1:3] = -drag, 1.0 / motor.inertia
-    rates[2, 2:] = -1.0 / lag, 1.0 / lag
-    return np.asarray(expm(rates * h), dtype=np.float64)[:3, 1:] - np.eye(3, 3, -1)
+    rates[1, 1:3] = -viscous / inertia, 1.0 / inertia
+    if lag > 0.0:
+        rates[2, 2:] = -1.0 / lag, 1.0 / lag
+    grown = np.asarray(expm(rates * h), dtype=np.float64)
+    if lag == 0.0:  # the torque asked for is there at once, whatever there was before
+        grown[:, 3] += grown[:, 2]
+        grown[:, 2] = 0.0
+    return frozen(grown[:3, 1:] - np.eye(3, 3, -1))

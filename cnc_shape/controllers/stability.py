@@ -123,11 +123,7 @@ def largest_stable_coupling(
 
 def largest_stable_position_gain(drive: Drive, control: Control) -> float:
     """Largest position gain with which a joint is stable by itself, 1/s; infinite for an ideal drive."""
-    if not lags(drive):
-        return np.inf
-    return min(
-        _largest_gain(_alone(drive, at_ratio(control, ratio)), 0) for ratio in gain_ratios((drive,), control)
-    )
+    return _largest_gain_of(drive, control)[0] if lags(drive) else np.inf
 
 
 def cartesian_loop(axes: Sequence[Axis], control: Control) -> tuple[tuple[Axis, ...], Control]:
@@ -202,11 +198,11 @@ def _check_joint(name: str, drive: Drive, control: Control) -> None:
             continue
         if ratio > 1.0 and stable(1.0):
             raise out_of_ratio(f"the loop of {name}", drive, control, ratio, stable)
-        gain, largest = control.position_gain, largest_stable_position_gain(drive, control)
-        where = "" if ratio == 1.0 else f" at {ratio:.3g} times its velocity gain"
+        largest, worst = _largest_gain_of(drive, control)
+        where = "" if worst == 1.0 else f" at {worst:.3g} times its velocity gain"
         raise InfeasibleError(
-            f"the loop of {name} is unstable{where}: position gain {gain:g} 1/s, stable below "
-            f"{largest:.4g} 1/s",
+            f"the loop of {name} is unstable{where}: position gain {control.position_gain:g} 1/s, "
+            f"stable below {largest:.4g} 1/s",
             hint=HINT,
         )
 
@@ -245,6 +241,14 @@ def _settles(drive: Drive, control: Control) -> bool:
 def _alone(drive: Drive, control: Control) -> LoopModel:
     """The loop of a joint by itself."""
     return loop_model((drive,), _uncoupled(control), np.zeros((0, 1, 1)), np.zeros((0, 3)))
+
+
+def _largest_gain_of(drive: Drive, control: Control) -> tuple[float, float]:
+    """Largest position gain with which a joint is stable by itself, 1/s, and the ratio that ends it."""
+    return min(
+        (_largest_gain(_alone(drive, at_ratio(control, ratio)), 0), ratio)
+        for ratio in gain_ratios((drive,), control)
+    )
 
 
 def _stable_alone(drive: Drive, control: Control) -> bool:
