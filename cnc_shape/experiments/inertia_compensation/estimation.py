@@ -48,9 +48,13 @@ def estimate_error(trial: Trial, bandwidth: float, delay: float = 0.0) -> float:
     response = lap(trial, observed(bandwidth)).response
     motors, period = response.motors, trial.circle.sample_time
     assert motors is not None
-    pitch, viscous, coulomb = np.array([[m.pitch, m.viscous, m.coulomb] for m in trial.motors]).T
-    speed = np.gradient(response.joint / pitch, period, axis=0)
-    borne = motors.load + viscous * speed + coulomb * np.sign(speed)
+    pitch, viscous, coulomb = (
+        frozen(column)
+        for column in zip(*((m.pitch, m.viscous, m.coulomb) for m in trial.motors), strict=True)
+    )
+    angle = response.joint / pitch
+    speed = (np.vstack([angle[1:], angle[-1:]]) - np.vstack([angle[:1], angle[:-1]])) / (2.0 * period)
+    borne = motors.load + viscous * speed + coulomb * np.copysign(1.0, speed)
     late = round(delay / period)
     borne, seen = borne[: len(borne) - late], motors.estimate[late:]
     return float(np.sqrt(np.mean((seen - borne) ** 2) / np.mean(borne**2)))

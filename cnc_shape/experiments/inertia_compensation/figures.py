@@ -57,7 +57,7 @@ def disturbance_torque() -> Figure:
         axes.set_ylabel(f"{XYZ[column]} (N m)")
         axes.legend(loc="upper left")
     panels[0].set_title("Fig. 6: disturbance torque, up to 2.5 N m along the normal; observer of 300 rad/s")
-    panels[-1].set(xlim=(0.0, LAST), xlabel="time (s)")
+    panels[-1].set(xlim=(0.0, LAST), ylim=(-2.4, 2.4), xlabel="time (s)")
     return figure
 
 
@@ -76,11 +76,11 @@ def contour_errors() -> Figure:
         for axes in panels:
             axes.plot(
                 _time(distance, TOGETHER), distance, **look(k, 1.1),
-                label=f"{name}: {found.rms:.2f} µm RMS, {found.max:.2f} µm at most",
+                label=f"{name}: {found.rms:.2f}, {found.max:.2f} µm",
             )  # fmt: skip
     panels[0].set(ylim=(0.0, 19.0), ylabel="contour error (µm)")
     panels[1].set(ylim=(0.0, 3.0), xlim=(0.0, LAST), xlabel="time (s)", ylabel="contour error (µm)")
-    panels[0].set_title("Fig. 7: contour error on the circle in space")
+    panels[0].set_title("Fig. 7: contour error on the circle in space (RMS and largest below)")
     panels[1].set_title("the same, closer")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
@@ -130,7 +130,7 @@ def load_sweep() -> Figure:
         )
     names = ("none", "paper", "constant\n× 2.5", "observer", "observer,\nfed motion", "ours")
     spread.set_xticks(range(len(names)), names, fontsize=7.5)
-    spread.set(ylim=(0.1, 9.0), yscale="log", ylabel="RMS (µm)")
+    spread.set(ylim=(0.07, 9.0), yscale="log", ylabel="RMS (µm)")
     spread.set_yticks([0.1, 0.2, 0.5, 1.0, 2.0, 5.0], ["0.1", "0.2", "0.5", "1", "2", "5"])
     spread.minorticks_off()
     spread.set_title("20 variants and their worst")
