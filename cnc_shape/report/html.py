@@ -15,7 +15,7 @@ from cnc_shape import __version__
 from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run, Summary
 from cnc_shape.report.motor_figures import motor_cases
-from cnc_shape.report.rows import UNDER, best_case, compared_with, is_mixed, row_names
+from cnc_shape.report.rows import UNDER, best_case, compared_with, folded, is_mixed, row_names
 from cnc_shape.report.table import columns, micrometres
 from cnc_shape.report.text import one_line
 from cnc_shape.report.trade_table import HEADINGS, cells, explanation
@@ -25,6 +25,7 @@ from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.trade import TradeRow
 
 LONGEST_LINE = 60  # characters of a program line that are shown
+LONGEST_NAME = 24  # characters of a case that stand on one line
 MOTOR_HEADINGS = (
     ("peak torque", "N m"), ("torque, RMS", "N m"), ("at the limit", "% of time"), ("peak load", "N m"),
     ("peak gain", "× nominal"), ("identified inertia", "kg m²"),
@@ -100,7 +101,7 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         columns=[(column.name, column.unit, column.numbers) for column in columns(summary)],
         rows=[
             {
-                "name": name.removeprefix(UNDER),
+                "name": _on_lines(name.removeprefix(UNDER)),
                 "under": name.startswith(UNDER),
                 "best": case is best and best is not first,
                 "cells": [column.cells[k] for column in columns(summary)],
@@ -136,6 +137,10 @@ def _picture(svg: bytes, caption: str) -> dict[str, str]:
     return {"data": base64.b64encode(svg).decode(), "caption": caption}
 
 
+def _on_lines(name: str) -> str:
+    return folded(name) if len(name) > LONGEST_NAME else name
+
+
 def _motor_caption(case: str) -> str:
     return f"{one_line(case)}: torque of the motors, the load that was injected, and what was made of it."
 
@@ -144,7 +149,7 @@ def _motor_rows(summary: Summary) -> list[dict[str, Any]]:
     """What every motor had to do, case by case; the case is named once."""
     return [
         {
-            "case": one_line(case.name) if k == 0 else "",
+            "case": _on_lines(one_line(case.name)) if k == 0 else "",
             "span": len(case.motors),
             "joint": motor.joint.upper(),
             "numbers": (

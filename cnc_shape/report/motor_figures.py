@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.pipeline import Run
 from cnc_shape.recording import Signals
 from cnc_shape.report.figures import worst_rows
-from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, look, new_figure, styled
+from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, new_figure, styled
 from cnc_shape.response import MotorSignals
 
 if TYPE_CHECKING:
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DRAWN = 600  # buckets of a line
-LOAD: Mapping[str, Any] = {"color": PATH_COLOUR, "linewidth": 2.4, "alpha": 0.6}
-TORQUE: Mapping[str, Any] = {"color": COLOURS[4], "linewidth": 0.8}
-ESTIMATE: Mapping[str, Any] = {"color": COLOURS[1], "linewidth": 1.1}
+LOAD: dict[str, Any] = {"color": PATH_COLOUR, "linewidth": 2.4, "alpha": 0.6}
+TORQUE: dict[str, Any] = {"color": COLOURS[4], "linewidth": 0.8}
+ESTIMATE: dict[str, Any] = {"color": COLOURS[1], "linewidth": 1.1}
+MOTORS: Sequence[dict[str, Any]] = tuple(
+    {"color": COLOURS[k], "linestyle": dash, "linewidth": 1.1} for dash in ("-", "--") for k in (0, 2, 3, 5)
+)
 
 
 def motor_cases(run: Run) -> list[Signals]:
@@ -43,23 +46,24 @@ def motor_figure(signals: Signals) -> Figure:
         raise ValueError(f"{signals.case=} has no servo motors")
     below = _below(motors)
     count = len(motors.joints)
-    figure, axes = new_figure(WIDTH, 0.75 + 1.25 * (count + len(below)), count + len(below), 1, sharex=True)
+    figure, axes = new_figure(WIDTH, 0.45 + 1.25 * (count + len(below)), count + len(below), 1, sharex=True)
     for k, (ax, joint) in enumerate(zip(axes, motors.joints, strict=False)):
         _draw(ax, signals.time, motors.load[:, k], "load, injected", LOAD)
-        _draw(ax, signals.time, motors.torque[:, k], "torque of the motor", TORQUE)
+        _draw(ax, signals.time, motors.torque[:, k], "torque", TORQUE)
         if motors.estimate.any():
-            _draw(ax, signals.time, motors.estimate[:, k], "load, as the observer sees it", ESTIMATE)
+            _draw(ax, signals.time, motors.estimate[:, k], "load, observed", ESTIMATE)
         ax.set_title(f"Motor {joint.upper()}")
         ax.set_ylabel("torque (N m)")
     for ax, (title, label, values) in zip(axes[count:], below, strict=True):
         for k, joint in enumerate(motors.joints):
-            _draw(ax, signals.time, values[:, k], f"motor {joint.upper()}", look(k))
+            _draw(ax, signals.time, values[:, k], joint.upper(), MOTORS[k % len(MOTORS)])
         ax.set_title(title)
         ax.set_ylabel(label)
     for ax in axes:
         ax.margins(x=0.0)
     axes[-1].set_xlabel("time (s)")
-    _legend(figure, axes[:1] + axes[count : count + 1])
+    for ax in (axes[0], *axes[count : count + 1]):
+        _legend(ax)
     return figure
 
 
@@ -73,12 +77,11 @@ def _below(motors: MotorSignals) -> list[tuple[str, str, FloatArray]]:
     return [panel for panel in panels if (panel[2] != panel[2][:1]).any()]
 
 
-def _draw(ax: Axes, time: FloatArray, values: FloatArray, label: str, style: Mapping[str, Any]) -> None:
+def _draw(ax: Axes, time: FloatArray, values: FloatArray, label: str, style: dict[str, Any]) -> None:
     rows = worst_rows(values, DRAWN)
     ax.plot(time[rows], values[rows], label=label, **style)
 
 
-def _legend(figure: Figure, axes: Sequence[Axes]) -> None:
-    found = [pair for ax in axes for pair in zip(*ax.get_legend_handles_labels(), strict=True)]
-    handles, labels = zip(*found, strict=True)
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+def _legend(ax: Axes) -> None:
+    """Name the lines beside the panel's title."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=6, borderaxespad=0.0)
