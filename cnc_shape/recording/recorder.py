@@ -93,12 +93,12 @@ class Recorder:
         )  # fmt: skip
         for name, values in zip(MOTIONS, motions, strict=True):
             table[waited:, places[name]] = values
-        if self._motors and len(command):
-            told = response.motors
-            if told is None or told.joints != self._motors:
-                raise ValueError(f"{self._motors=}, not {told and told.joints}")
+        motors = response.motors
+        if len(command) and self._motors != (motors.joints if motors is not None else ()):
+            raise ValueError(f"{self._motors=} and {motors=}")
+        if len(command) and motors is not None:
             for name in MOTORS:
-                table[waited:, places[name]] = getattr(told, name)
+                table[waited:, places[name]] = getattr(motors, name)
         self._waiting = table[decided:, : self._waiting.shape[1]].copy()
         rows = table[:decided]
         for name, error in zip(ERRORS, errors, strict=True):
