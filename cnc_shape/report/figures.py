@@ -100,8 +100,8 @@ def path_figure(run: Run) -> Figure:
         programmed = ax.plot(run.path[:, i], run.path[:, j], color=PATH_COLOUR, linewidth=2.2, alpha=0.45)
         kept = worst_rows(signals.tool_error, DRAWN_PATH // 2)
         drawn = _magnified(signals, factor, kept)
-        style = {**look(k, width=0.8), "color": cases[k]["color"]}
-        tool = ax.plot(drawn[:, i], drawn[:, j], **style)
+        style = cases[k] if cases[k]["linestyle"] != DOTS else {**cases[k], "linestyle": "-"}
+        tool = ax.plot(drawn[:, i], drawn[:, j], **{**style, "linewidth": 0.8})
         worst = int(signals.tool_error.argmax())
         mark = _magnified(signals, factor, np.array([worst]))
         circle = ax.plot(
