@@ -157,12 +157,14 @@ def error_figure(run: Run) -> Figure:
 def motion_figure(run: Run) -> Figure:
     """Speed and acceleration of every case's command over time; cases with one command share a line."""
     figure, axes = new_figure(WIDTH, 4.4, 2, 1, sharex=True)
-    for k, (names, signals) in _by_command(run).items():
+    commands = _by_command(run)
+    for k, (names, signals) in commands.items():
+        label = "all cases" if len(names) > 2 and len(commands) == 1 else _several(names)
         speed = np.sqrt((signals.velocity[:, :3] ** 2).sum(axis=1))
         acceleration = np.abs(signals.acceleration[:, :3]).max(axis=1, initial=0.0)
         for ax, values in zip(axes, (speed, acceleration), strict=True):
             rows = worst_rows(values)
-            ax.plot(signals.time[rows], values[rows], **look(k), label=_several(names))
+            ax.plot(signals.time[rows], values[rows], **look(k), label=label)
     axes[0].set_title("Path speed of the command")
     axes[0].set_ylabel("speed (mm/s)")
     axes[1].set_title("Largest axis acceleration of the command")

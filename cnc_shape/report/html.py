@@ -142,7 +142,10 @@ def _on_lines(name: str) -> str:
 
 
 def _motor_caption(case: str) -> str:
-    return f"{one_line(case)}: torque of the motors, the load that was injected, and what was made of it."
+    return (
+        f"{one_line(case)}: torque of the motors, the load that was injected, and what was made of it. To an "
+        "observer the motor's own friction is a load too."
+    )
 
 
 def _motor_rows(summary: Summary) -> list[dict[str, Any]]:
