@@ -318,6 +318,6 @@ def _copy(state: SimulationState) -> SimulationState:
 
 
 def _residual_ticks(machine: Machine, control: Control) -> int:
-    periods = [mode.damped_period for axis in machine.axes for mode in axis.modes]
+    periods = [mode.longest_period for axis in machine.axes for mode in axis.modes]
     watched = max(RESIDUAL_PERIODS * max(periods, default=0.0), SHORTEST_RESIDUAL_TIME)
     return int(np.ceil(watched / control.sample_time))

@@ -17,7 +17,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.controllers import cross_coupling, estimators, feedforward, position_loop
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import kernel, structure
 from cnc_shape.kernels.linear import solve
 
 FURTHEST = 1e4  # mm or rad, following error beyond which the loop has diverged
@@ -67,7 +67,7 @@ def servo_loop(
     """
     position, velocity, acceleration, reference, reference_velocity = command
     inverse, phase, every = poses
-    transition, held, rising, states, ideal = plant
+    transition, held, rising, states, ideal, varying = plant
     state, late, frame, coupling, cursor = memory
     n, joints = reference.shape[0] - 1, reference.shape[1]
     linear = min(3, position.shape[1])
@@ -146,6 +146,13 @@ def servo_loop(
             q, v = state[j, 0], state[j, 1]
             for i in range(2, s, 2):
                 d, w = state[j, i], state[j, i + 1]
+                if varying.rows[j, i // 2 - 1, 1] > 0:
+                    fading = 0.0 if ideal[j] else (varying.gain[j] * c0 - v) * varying.rate[j]
+                    start = c0 if ideal[j] else 0.0
+                    state[j, i], state[j, i + 1] = structure.swung(
+                        varying, j, i // 2 - 1, joint[k], d, w, start, c1 / sample_time, fading, sample_time
+                    )
+                    continue
                 for r in range(i, i + 2):
                     free = transition[j, r, 0] * q + transition[j, r, 1] * v
                     free += transition[j, r, i] * d + transition[j, r, i + 1] * w
