@@ -14,9 +14,10 @@ phi_0 = exp x, phi_k = (phi_{k-1} - 1/(k-1)!) / x,
     q+  = q + T phi_1 q' + b T (phi_2 u + phi_3 (u_end - u))         b = gain T / time_constant, or T
     q'+ =     phi_0 q' + b   (phi_1 u + phi_2 (u_end - u))
 
-A mode with a table leaves these matrices aside: its frequency and damping are those of where the table's axis stands when the
-sample begins, and `kernels.structure.swing` moves it. The drive's acceleration, which pushes it, is known within
-the sample: linear for an ideal drive, ``(gain u - q') / time_constant e^{-t / time_constant}`` for a lag.
+A mode with a table leaves these matrices aside: its frequency and damping are those of where the table's
+axis stands when the sample begins, and `kernels.structure.swing` moves it. The drive's acceleration, which
+pushes it, is known within the sample: linear for an ideal drive, and for one with a lag
+``(gain u - q') / time_constant e^{-t / time_constant}``.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ import naive
 import numpy as np
 import pytest
 from commands import circling, part, point_to_point
+from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -15,8 +16,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cnc_shape.arrays import frozen
+from cnc_shape.config.dump import dump_machine
+from cnc_shape.config.machine_file import parse_machine
 from cnc_shape.controllers import Control, CrossCoupling, Feedforward
-from cnc_shape.errors import OptionError
+from cnc_shape.errors import ConfigError, OptionError
 from cnc_shape.kernels.structure import standing, swing
 from cnc_shape.kinematics import corexy
 from cnc_shape.limits import Limits
@@ -28,12 +31,14 @@ from cnc_shape.shapers.analysis import residual_vibration
 from cnc_shape.shapers.shaping import shape
 from cnc_shape.simulation import simulate, simulating
 from cnc_shape.trajectory import Trajectory
+from cnc_shape.units import DEGREE
 
 LIMITS = Limits(1000.0, 10_000.0)
 T = 1e-3
 OVER_Z = ModeTable("z", (0.0, 100.0, 300.0), (50.0, 40.0, 25.0), (0.02, 0.03, 0.01))
 SHAPED_AT = Mode(40.0, 0.03, 0.7, table=OVER_Z)
-DRIVES = (IdealDrive(), FirstOrderLag(0.0148, 0.992), FirstOrderLag(0.2 * T, 1.1))
+IDEAL = IdealDrive()
+DRIVES = (IDEAL, FirstOrderLag(0.0148, 0.992), FirstOrderLag(0.2 * T, 1.1))
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -131,7 +136,7 @@ def test_a_stretch_is_its_parts(omega, zeta, rate, parts):
 # --- a whole motion -------------------------------------------------------------------------------
 
 
-def machine(drive=IdealDrive(), mode=SHAPED_AT, more=()):
+def machine(drive=IDEAL, mode=SHAPED_AT, more=()):
     axes = tuple(Axis(name, LIMITS, drive, (mode, *more) if name == "x" else ()) for name in "xyz")
     return Machine("test", axes)
 
@@ -258,8 +263,8 @@ def test_a_shaper_leaves_least_where_it_was_designed_and_what_theory_says_elsewh
     ratios = {}
     for height in (0.0, 50.0, 80.0, 100.0, 140.0, 220.0):
         command = point_to_point(T, distance=1.5, acceleration=16_000.0)
-        lifted = command.position + [0.0, 0.0, height]
-        command = replace(command, position=frozen(lifted))
+        lift = np.array([0.0, 0.0, height])
+        command = replace(command, position=frozen(command.position + lift))
         left = []
         for told in (shape(command, {"x": shaper}), command):
             state, _ = simulating(stage, Control(T))(None, None, told, True)
@@ -269,3 +274,93 @@ def test_a_shaper_leaves_least_where_it_was_designed_and_what_theory_says_elsewh
         assert_allclose(ratios[height], theory, rtol=0.02, atol=2e-3)
     assert ratios[100.0] < 2e-3
     assert ratios[0.0] > ratios[50.0] > ratios[80.0] > ratios[100.0] < ratios[140.0] < ratios[220.0]
+
+
+# --- the machine file -----------------------------------------------------------------------------
+
+FILE = """axes:
+  x:
+    limits: {{velocity_mm_s: 300, acceleration_mm_s2: 3000}}
+    modes:
+      - frequency_hz: 40
+        damping_ratio: 0.03
+        over_position: {{{keys}}}
+  a:
+    limits: {{velocity_deg_s: 90, acceleration_deg_s2: 900}}
+"""
+
+
+def parse(keys):
+    return parse_machine(FILE.format(keys=keys).encode(), "machine.yaml")
+
+
+def table_of(keys):
+    return parse(keys).machine.axis("x").modes[0].table
+
+
+@pytest.mark.parametrize(
+    ("keys", "table"),
+    [
+        (
+            "axis: z, position_mm: [0, 100, 300], frequency_hz: [50, 40, 25], damping_ratio: [0.02, 0.03, 0.01]",
+            OVER_Z,
+        ),
+        (
+            "position_mm: [0, 9], frequency_hz: [50, 40]",
+            ModeTable("x", (0.0, 9.0), (50.0, 40.0), (0.03, 0.03)),
+        ),
+        (
+            "axis: a, position_deg: [-90, 37], frequency_hz: [50, 40], damping_ratio: 0",
+            ModeTable("a", (-90 * DEGREE, 37 * DEGREE), (50.0, 40.0), (0.0, 0.0)),
+        ),
+    ],
+    ids=["all keys", "least keys", "rotary"],
+)
+def test_a_machine_file_says_it_and_a_dump_says_it_again(keys, table):
+    setup = parse(keys)
+    assert setup.machine.axis("x").modes == (Mode(40.0, 0.03, table=table),)
+    assert parse_machine(dump_machine(setup).encode(), "dump") == setup
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("frequency_hz: [50, 40]", "7:24: error: axes.x.modes[0].over_position: position_mm is missing"),
+        (
+            "axis: a, position_mm: [0, 1], frequency_hz: [50, 40]",
+            "7:47: error: axes.x.modes[0].over_position.position_mm: axis a stands in degrees",
+        ),
+        ("position_deg: [0, 1], frequency_hz: [50, 40]", "axis x stands in mm"),
+        (
+            "position_mm: [0, 2, 1], frequency_hz: [50, 40, 30]",
+            "7:45: error: axes.x.modes[0].over_position.position_mm[2]: 1 is not above 2 before it",
+        ),
+        ("position_mm: [0, 2, 3], frequency_hz: [50, 40]", "frequency_hz: 2 values for 3 positions"),
+        (
+            "position_mm: [0, 2], frequency_hz: [50, 40], damping_ratio: [0.1, 0.1, 0.1]",
+            "damping_ratio: 3 values for 2 positions",
+        ),
+        ("position_mm: [0, 2], frequency_hz: [50, 40], damping_ratio: []", "at least 1"),
+        ("position_mm: [0], frequency_hz: [50]", "at least 2"),
+        ("position_mm: [0, 2], frequency_hz: [50, 0]", "at least 0.001, not 0"),
+        (
+            "position_mm: [0, 2], frequency_hz: [50, 40], damping_ratio: soft",
+            "must be a number, not the text",
+        ),
+        ("position_mm: [0, 2], frequency_hz: [50, 40], damping_ratio: 1", "less than 1"),
+        ("axis: u, position_mm: [0, 2], frequency_hz: [50, 40]", "must be x, y, z, a, b or c"),
+        ("positions_mm: [0, 2], frequency_hz: [50, 40]", "unknown key"),
+    ],
+)
+def test_what_a_machine_file_cannot_mean_is_refused_at_its_place(keys, message):
+    with pytest.raises(ConfigError) as refused:
+        parse(keys)
+    assert message in str(refused.value)
+
+
+def test_the_example_of_the_documentation_is_a_machine():
+    text = (ROOT / "docs" / "machine-file.md").read_text(encoding="utf-8")
+    example = text.split("## Modes over position")[1].split("```yaml")[1].split("```")[0]
+    setup = parse_machine(example.encode(), "example.yaml")
+    table = setup.machine.axis("x").modes[0].table
+    assert table == ModeTable("z", (-300.0, -100.0, 0.0), (28.0, 40.0, 48.0), (0.02, 0.03, 0.03))

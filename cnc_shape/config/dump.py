@@ -6,6 +6,7 @@ from math import inf, isfinite, nextafter
 
 import yaml
 
+from cnc_shape.config.mode_tables import dump_mode_table
 from cnc_shape.config.setup import Planning, Setup
 from cnc_shape.controllers import Control, CrossCoupling
 from cnc_shape.limits import Limits
@@ -131,6 +132,8 @@ def _mode(mode: Mode) -> dict[str, object]:
         keys["frequency_uncertainty"] = mode.frequency_uncertainty
     if mode.damping_uncertainty:
         keys["damping_uncertainty"] = mode.damping_uncertainty
+    if mode.table is not None:
+        keys["over_position"] = dump_mode_table(mode.table, to_degrees)
     return keys
 
 

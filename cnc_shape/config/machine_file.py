@@ -14,6 +14,7 @@ from cnc_shape.config.bundled import bundled
 from cnc_shape.config.complaints import complaint, key_place, locate
 from cnc_shape.config.control import read_control
 from cnc_shape.config.joints import AxisModels, drive_of, read_joints, read_kinematics
+from cnc_shape.config.mode_tables import read_mode_table
 from cnc_shape.config.models import (
     AxesModel,
     LinearAxisModel,
@@ -28,7 +29,7 @@ from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refus
 from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine
-from cnc_shape.modes import Mode
+from cnc_shape.modes import Mode, ModeTable
 from cnc_shape.program import Note
 from cnc_shape.shapers import SINGLE_MODE, Shaper
 from cnc_shape.tools import Tool
@@ -191,9 +192,17 @@ def _modes(source: str, tree: Tree, axis: str, models: list[ModeModel]) -> tuple
             share if model.participation is None else model.participation,
             model.frequency_uncertainty,
             model.damping_uncertainty,
+            _table(source, tree, axis, index, model),
         )
-        for model in models
+        for index, model in enumerate(models)
     )
+
+
+def _table(source: str, tree: Tree, axis: str, index: int, model: ModeModel) -> ModeTable | None:
+    if model.over_position is None:
+        return None
+    path = ("axes", axis, "modes", index, "over_position")
+    return read_mode_table(source, tree, path, model.over_position, axis, model.damping_ratio)
 
 
 def _choice(model: LinearAxisModel | RotaryAxisModel) -> ShaperChoice | None:

@@ -11,6 +11,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from cnc_shape.config.kinematics import AnyKinematics
+from cnc_shape.config.mode_models import OverPositionModel
 from cnc_shape.config.shaper_options import AnyShaper
 from cnc_shape.config.strict import Strict, refuse_value
 
@@ -75,6 +76,7 @@ class ModeModel(Strict):
     participation: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     frequency_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     damping_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    over_position: OverPositionModel | None = None
 
 
 class _AxisModel(Strict):

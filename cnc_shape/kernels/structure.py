@@ -2,8 +2,8 @@
 """A mode whose frequency and damping depend on where an axis stands, one stretch of time at a time.
 
 Frequency and damping are frozen over the stretch, so that its end is known in closed form for every push
-that a drive exerts: a constant one (motor torque held over a tick), a linear one (the cubic of an ideal drive),
-and one that dies away (a drive with a lag)::
+that a drive exerts: a constant one (motor torque held over a tick), a linear one (the cubic of an ideal
+drive), and one that dies away (a drive with a lag)::
 
     d'' + 2 zeta omega d' + omega^2 d = start + slope t + fading e^{-rate t}
 
