@@ -8,6 +8,9 @@ A lag drive, ``q'' = (gain u - q') / time_constant``, holds its input u over the
 An ideal drive is where it is told to be. Between samples it follows the cubic through commanded position
 and velocity, whose acceleration is linear over the sample; the modes answer that acceleration exactly.
 
+A servo motor moves by itself (`controllers.servo_drive`); its acceleration is constant over every tick of its
+velocity loop, and here stand the modes alone, which answer that acceleration.
+
 A drive without modes is written down. With x = -T / time_constant (0 for an ideal drive) and the functions
 phi_0 = exp x, phi_k = (phi_{k-1} - 1/(k-1)!) / x,
 
@@ -31,7 +34,7 @@ from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # s
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.kernels.structure import Varying
-from cnc_shape.machine import Axis, Drive, FirstOrderLag
+from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive, ServoMotor
 from cnc_shape.units import TWO_PI
 
 PHI_TERMS = 18  # of the series of phi_3, whose rest at |x| <= 1 is below 1/21!
@@ -68,21 +71,24 @@ def continuous(axis: Axis) -> tuple[FloatArray, FloatArray]:
     return A, B
 
 
-def discretise(axes: Sequence[Axis], sample_time: float) -> Plant:
-    """Discretise every axis at `sample_time` (s), exactly."""
+def discretise(axes: Sequence[Axis], sample_time: float, velocity_tick: float | None = None) -> Plant:
+    """Discretise every axis at `sample_time` (s), exactly; a servo motor's at its `velocity_tick` (s)."""
     most = max(2 + 2 * len(axis.modes) for axis in axes)
     transition = np.zeros((len(axes), most, most))
     held, rising = np.zeros((len(axes), most)), np.zeros((len(axes), most))
     for row, axis in enumerate(axes):
         s = 2 + 2 * len(axis.modes)
-        answer = _exponential(axis, sample_time) if axis.modes else _written_down(axis.drive, sample_time)
+        period = sample_time
+        if isinstance(axis.drive, ServoMotor) and velocity_tick is not None:
+            period = velocity_tick
+        answer = _exponential(axis, period) if axis.modes else _written_down(axis.drive, period)
         transition[row, :s, :s], held[row, :s], rising[row, :s] = answer
     return Plant(
         frozen(transition),
         frozen(held),
         frozen(rising),
         frozen_integers([2 + 2 * len(axis.modes) for axis in axes]),
-        frozen_integers([not isinstance(axis.drive, FirstOrderLag) for axis in axes]),
+        frozen_integers([isinstance(axis.drive, IdealDrive) for axis in axes]),
         vary(axes),
     )
 

@@ -8,8 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen, frozen_integers
-from cnc_shape.controllers import Control, cross_coupling, feedforward, position_loop
-from cnc_shape.controllers.loop import Command, Memory, Poses, servo_loop
+from cnc_shape.controllers import (
+    Control,
+    DisturbanceObserver,
+    cross_coupling,
+    disturbance_observer,
+    feedforward,
+    friction_feedforward,
+    inertia_compensation,
+    inertia_identification,
+    position_loop,
+    servo_drive,
+)
+from cnc_shape.controllers.loop import Command, Memory, MotorMemory, Poses, Terms, servo_loop
+from cnc_shape.disturbances import EncoderNoise
 from cnc_shape.joints import Joints, joints_of
 from cnc_shape.kernels.foot_point import PathTable
 from cnc_shape.machine import FirstOrderLag, IdealDrive, Machine
@@ -21,6 +33,7 @@ NO_PATH = PathTable(
     frozen(np.zeros((0, 11))), _NOTHING, _NOTHING, frozen(np.zeros((0, 17))), frozen(np.zeros((0, 6))),
     frozen(np.zeros((0, 6))), frozen_integers(np.zeros(0, np.int64)),
 )  # fmt: skip
+UNLOADED = frozen(np.zeros((0, 0, 0)))
 NO_POSES = Poses(frozen(np.zeros((0, 0, 0))), 0, 1)
 
 
@@ -40,6 +53,7 @@ class Ticks:
     rate: FloatArray  # mm/s or rad/s, their velocity
     tool: FloatArray  # mm or rad, drives plus structure where that is behind each of them
     drive: FloatArray  # mm/s or rad/s, velocity command
+    signals: FloatArray  # (n,j,7) of the servo motors; (0,j,7) where there are none
     done: int  # ticks until the loop diverged; n where it did not
 
 
@@ -49,9 +63,8 @@ class ServoLoop:
 
     control: Control
     plant: Plant
-    position_gains: position_loop.PositionGains
-    feed_gains: feedforward.FeedforwardGains
-    couple_gains: cross_coupling.CrossCouplingGains
+    motors: servo_drive.Motors
+    terms: Terms
 
     @property
     def bends(self) -> bool:
@@ -62,44 +75,88 @@ class ServoLoop:
         """Memory of a loop at rest at `reference`, (j,) mm or rad."""
         plant = np.zeros(self.plant.held.shape)
         plant[:, 0] = reference
+        late = (self.control.delay_samples, reference.size)
         return Memory(
             plant,
-            np.zeros((self.control.delay_samples, reference.size)),
+            np.zeros(late),
             np.zeros((2, 3)),
             np.zeros((3, 3)),
             np.zeros(4, np.int64),
+            MotorMemory(
+                motor := servo_drive.start(self.motors, reference),
+                disturbance_observer.start(motor[:, servo_drive.READ]),
+                inertia_compensation.start(self.control.inertia_compensation, reference.size),
+                inertia_identification.start(reference.size),
+                np.zeros(reference.size),
+                np.zeros(late),
+                np.zeros(1, np.int64),
+            ),
         )
 
-    def run(self, memory: Memory, command: Command, poses: Poses, windows: PathWindows) -> Ticks:
-        """Run as many ticks as the command has samples but one; `memory` is changed in place."""
-        joint, rate, tool, drive, done = servo_loop(
-            command, poses, windows.path, windows.lower, windows.upper, self.control.sample_time, self.plant,
-            self.position_gains, int(self.control.feedforward is not None), self.feed_gains,
-            int(self.control.cross_coupling is not None), self.couple_gains, memory,
+    def run(
+        self,
+        memory: Memory,
+        command: Command,
+        poses: Poses,
+        windows: PathWindows,
+        load: FloatArray = UNLOADED,
+    ) -> Ticks:
+        """Run as many ticks as the command has samples but one; `memory` is changed in place.
+
+        load (n,ticks,j) N m on servo motors, or without rows.
+        """
+        joint, rate, tool, drive, signals, done = servo_loop(
+            command, poses, windows.path, windows.lower, windows.upper, load, self.control.sample_time,
+            self.plant, self.motors, self.terms, memory,
         )  # fmt: skip
-        return Ticks(frozen(joint), frozen(rate), frozen(tool), frozen(drive), done)
+        return Ticks(frozen(joint), frozen(rate), frozen(tool), frozen(drive), frozen(signals), done)
 
 
 def copied(memory: Memory) -> Memory:
     """Copy a memory, so that the one before stays as it was."""
     return Memory(
         memory.plant.copy(), memory.late.copy(), memory.frame.copy(), memory.coupling.copy(),
-        memory.cursor.copy(),
+        memory.cursor.copy(), _copied_motors(memory.motors),
     )  # fmt: skip
 
 
-def make_loop(joints: Joints, control: Control) -> ServoLoop:
+def _copied_motors(motors: MotorMemory) -> MotorMemory:
+    return MotorMemory(
+        motors.motor.copy(), motors.observer.copy(), motors.compensation.copy(), motors.identification.copy(),
+        motors.friction.copy(), motors.late.copy(), motors.clock.copy(),
+    )  # fmt: skip
+
+
+def make_loop(joints: Joints, control: Control, noise: EncoderNoise | None = None) -> ServoLoop:
     """Make the loop of a machine ready."""
-    gains = control.joint_gains or (control.position_gain,) * len(joints.drives)
-    if len(gains) != len(joints.drives):
-        raise ValueError(f"{len(gains)=} {len(joints.drives)=}")
-    return ServoLoop(
-        control,
-        discretise(joints.drives, control.sample_time),
+    drives, period = joints.drives, control.sample_time
+    gains = control.joint_gains or (control.position_gain,) * len(drives)
+    if len(gains) != len(drives):
+        raise ValueError(f"{len(gains)=} {len(drives)=}")
+    reading = noise or EncoderNoise(0.0)
+    motors = servo_drive.motors(drives, period, reading.standard_deviation, reading.seed)
+    late = 1.0 - (control.feedforward.velocity if control.feedforward else 0.0)
+    lags = [late / gain for gain in gains]
+    terms = Terms(
         position_loop.PositionGains(frozen(gains)),
-        feedforward.gains(control.feedforward or feedforward.Feedforward(), joints.drives),
+        int(control.feedforward is not None),
+        feedforward.gains(control.feedforward or feedforward.Feedforward(), drives),
+        int(control.cross_coupling is not None),
         cross_coupling.gains(control.cross_coupling),
+        friction_feedforward.gains(control.friction_feedforward, drives, lags, period),
+        disturbance_observer.gains(observer_of(control), motors.believed, motors.period),
+        inertia_compensation.gains(control.inertia_compensation, drives, gains, period),
+        inertia_identification.gains(control.inertia_identification, period),
     )
+    return ServoLoop(control, discretise(drives, period, motors.period), motors, terms)
+
+
+def observer_of(control: Control) -> DisturbanceObserver | None:
+    """The observer of a loop: its own, or one that only watches where another term needs it."""
+    if control.disturbance_observer is not None:
+        return control.disturbance_observer
+    needed = control.inertia_compensation is not None or control.inertia_identification is not None
+    return DisturbanceObserver(feedforward=0.0) if needed else None
 
 
 def structure_of(machine: Machine, sample_time: float) -> ServoLoop:

@@ -19,7 +19,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers import Control, Estimator
-from cnc_shape.controllers.loop import Command, Memory, Poses
+from cnc_shape.controllers.loop import SIGNALS, Command, Memory, Poses
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
@@ -31,7 +31,7 @@ from cnc_shape.refusals import (
     refuse_divergence,
     refuse_pose,
 )
-from cnc_shape.response import Response
+from cnc_shape.response import MotorSignals, Response
 from cnc_shape.segments import path_table
 from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
 from cnc_shape.toolpath import Toolpath
@@ -152,11 +152,14 @@ class _Stage:
         self._disturbances = disturbances
         self._control, self._joints, self._period = control, joints, control.sample_time
         self._watched = _residual_ticks(machine, control)
-        self._loop = make_loop(joints, control)
+        self._loop = make_loop(joints, control, disturbances.noise)
         self._structure = None if joints.cartesian else structure_of(machine, self._period)
         coupling = control.cross_coupling
-        self._searches = coupling is not None and coupling.estimator is Estimator.FOOT_POINT
-        self._coupled = coupling is not None and not joints.cartesian
+        self._servo = bool(self._loop.motors.servo.any())
+        explained = self._servo and bool(self._loop.terms.compensation.models) and len(machine.axes) >= 3
+        self._needs_path = coupling is not None and coupling.estimator is Estimator.FOOT_POINT
+        self._searches = self._needs_path or explained
+        self._coupled = (coupling is not None or self._searches) and not joints.cartesian
         self._windows = None
         if self._searches or not joints.cartesian:
             self._windows = windowing(replace(reach, ahead=max(reach.ahead, 1)))
@@ -183,7 +186,7 @@ class _Stage:
         if windows is not None:
             refuse_pose(self._joints, pose, lines, source)
         poses, inverse = self._poses(now, pose, ticks)
-        if self._coupled:
+        if self._coupled and self._control.cross_coupling is not None:
             check_on_the_way(self._joints, self._control, pose, told.velocity, now.ticks, lines, source)
         ran = self._loop.run(now.loop, told, poses, self._path(windows))
         before = now.ticks * self._period
@@ -191,7 +194,7 @@ class _Stage:
         position, tool, turn = self._axes(now, pose, ran)
         response = Response(
             command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
-            ran.drive, turn,
+            ran.drive, turn, self._signals(ran),
         )  # fmt: skip
         now = replace(now, ticks=now.ticks + ticks, before=told.reference[ticks - 1 : ticks], inverse=inverse)
         if last:
@@ -226,7 +229,10 @@ class _Stage:
 
     def _nothing(self, command: Trajectory) -> Response:
         none = frozen(np.zeros((0, len(self._joints.drives))))
-        return Response(command, none, none, command.position, command.position, none, frozen([]))
+        idle = Ticks(none, none, none, none, frozen(np.zeros((0, len(self._joints.drives), SIGNALS))), 0)
+        return Response(
+            command, none, none, command.position, command.position, none, frozen([]), self._signals(idle)
+        )
 
     def _told(self, now: SimulationState, command: Trajectory, ticks: int) -> tuple[FloatArray, Command]:
         """Poses and what the loop is told, one sample more than ticks: after the last, rest.
@@ -269,8 +275,18 @@ class _Stage:
         if windows is None or not self._searches:
             return PathWindows()
         if windows.path.low.size == 0:
-            raise ValueError("cross-coupling by foot points needs a path")
+            if self._needs_path:
+                raise ValueError("cross-coupling by foot points needs a path")
+            return PathWindows()
         return PathWindows(path_table(windows.path), windows.lower, windows.upper)
+
+    def _signals(self, ran: Ticks) -> MotorSignals | None:
+        """What the servo motors did, if there are any."""
+        if not self._servo:
+            return None
+        turned = np.flatnonzero(self._loop.motors.servo)
+        columns = (frozen(ran.signals[: ran.done, turned, column]) for column in range(SIGNALS))
+        return MotorSignals(tuple(self._joints.names[joint] for joint in turned), *columns)
 
     def _axes(
         self, now: SimulationState, pose: FloatArray, ran: Ticks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -826,3 +827,115 @@ def vibration_over_position(axes, joint, rate, told, sample_time):
                     ]
                 state = (expm(M * T) @ [*state, *push])[:2]
     return bent
+
+
+# --- disturbances -------------------------------------------------------------------------------------
+
+
+def burst(t, frequency, length, centre):
+    """A burst of a sine under a cosine-squared window, over its largest value on a fine grid."""
+
+    def shape(late):
+        return np.sin(2 * np.pi * frequency * late) * np.cos(np.pi * late / length) ** 2
+
+    peak = np.abs(shape(np.linspace(-length / 2, length / 2, 2_000_001))).max()
+    return np.array([shape(x - centre) / peak if abs(x - centre) < length / 2 else 0.0 for x in t])
+
+
+def pulse_train(t, start, rise, hold, gap, peaks):
+    """Pulses with raised-cosine edges, each at its own place, added up."""
+    total = np.zeros(len(t))
+    for peak in peaks:
+        for k, x in enumerate(np.asarray(t) - start):
+            if 0.0 <= x < rise:
+                total[k] += peak * (1.0 - np.cos(np.pi * x / rise)) / 2.0
+            elif rise <= x < rise + hold:
+                total[k] += peak
+            elif rise + hold <= x < rise + hold + rise:
+                total[k] += peak * (1.0 + np.cos(np.pi * (x - rise - hold) / rise)) / 2.0
+        start += rise + hold + rise + gap
+    return total
+
+
+def carried(vector, before, after):
+    """A vector under the smallest rotation from one unit vector to another, by Rodrigues' formula."""
+    axis, cosine = np.cross(before, after), before @ after
+    sine = np.linalg.norm(axis)
+    if sine < 1e-9:
+        return vector
+    axis = axis / sine
+    return vector * cosine + np.cross(axis, vector) * sine + axis * (axis @ vector) * (1.0 - cosine)
+
+
+def windowed(values, share):
+    """Every value's sum of itself and all before it under exponential weights, from zero on."""
+    weights = share * (1.0 - share) ** np.arange(len(values))
+    return np.array([np.tensordot(weights[k::-1], values[: k + 1], 1) for k in range(len(values))])
+
+
+def path_frames(velocity, acceleration, period, still, share):
+    """Tangent, normal and binormal of every sample, (n,3,3)."""
+    n = len(velocity)
+    speed = np.linalg.norm(velocity, axis=1)
+    moves = speed > still
+    tangent = np.zeros((n, 3))
+    tangent[moves] = velocity[moves] / speed[moves, None]
+    toward = np.zeros((n, 3))  # the centre, where there is one
+    if share == 0.0:
+        for k in np.flatnonzero(moves):
+            across = acceleration[k] - (acceleration[k] @ tangent[k]) * tangent[k]
+            curvature = np.linalg.norm(across) / speed[k] ** 2
+            if curvature > 1e-6 and np.linalg.norm(across) > 1e-10 * np.linalg.norm(acceleration[k]):
+                toward[k] = across / np.linalg.norm(across)
+    else:
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(int)))
+        for first, end in ends.reshape(-1, 2):
+            if end - first < 2:
+                continue
+            turns = windowed(np.diff(tangent[first:end], axis=0), share)
+            mean = windowed(turns, share)
+            square = windowed((turns**2).sum(axis=1), share)
+            step = windowed(speed[first + 1 : end] * period, share)
+            for k in range(first + 1, end):
+                bend = mean[k - first - 1]
+                bend = bend - (bend @ tangent[k]) * tangent[k]
+                size = np.linalg.norm(bend)
+                if size > 1e-6 * step[k - first - 1] and size**2 > 0.7 * square[k - first - 1]:
+                    toward[k] = bend / size
+    frames, last, normal, bent = np.zeros((n, 3, 3)), None, None, False
+    for k in range(n):
+        if moves[k]:
+            if toward[k].any():
+                normal, bent = -toward[k], True
+            elif bent:
+                normal = carried(normal, last, tangent[k])
+            else:
+                level = np.cross([0.0, 0.0, 1.0], tangent[k])
+                if np.linalg.norm(level) <= 1e-6:
+                    level = np.cross([1.0, 0.0, 0.0], tangent[k])
+                normal = level / np.linalg.norm(level)
+            last = tangent[k]
+        if last is not None:
+            frames[k] = last, normal, np.cross(last, -normal)
+    return frames
+
+
+def random_word(seed, joint, count):
+    """Hash of three integers to 64 bits: SplitMix64 seeded by SplitMix64, in whole numbers."""
+    every = 2**64 - 1
+    golden = 0x9E3779B97F4A7C15
+
+    def finaliser(z):
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & every
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & every
+        return z ^ (z >> 31)
+
+    stream = finaliser((finaliser((seed + golden) & every) + (joint + 1) * golden) & every)
+    return finaliser((stream + (count + 1) * golden) & every)
+
+
+def normal_noise(seed, joint, tick):
+    """Standard normal value by the transform of Box and Muller, of words 2 tick and 2 tick + 1."""
+    one, other = (random_word(seed, joint, 2 * tick + k) // 2**11 for k in (0, 1))
+    radius = math.sqrt(-2.0 * math.log((one + 0.5) / 2**53))
+    return radius * math.cos(2.0 * math.pi * (other / 2**53))

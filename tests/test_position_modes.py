@@ -23,7 +23,7 @@ from cnc_shape.errors import ConfigError, OptionError
 from cnc_shape.kernels.structure import standing, swing
 from cnc_shape.kinematics import corexy
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine
+from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine, ServoMotor
 from cnc_shape.modes import Mode, ModeTable
 from cnc_shape.plant import discretise
 from cnc_shape.shapers import zv
@@ -39,6 +39,7 @@ OVER_Z = ModeTable("z", (0.0, 100.0, 300.0), (50.0, 40.0, 25.0), (0.02, 0.03, 0.
 SHAPED_AT = Mode(40.0, 0.03, 0.7, table=OVER_Z)
 IDEAL = IdealDrive()
 DRIVES = (IDEAL, FirstOrderLag(0.0148, 0.992), FirstOrderLag(0.2 * T, 1.1))
+MOTOR = ServoMotor(4.6e-4, 7.1, 10.0, 5e-4, 0.08, 2e-4, 131_072)
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -155,7 +156,7 @@ def moving(sample_time=T, seconds=0.4, reach=200.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("drive", DRIVES, ids=["ideal", "lag", "lag within a sample"])
+@pytest.mark.parametrize("drive", [*DRIVES, MOTOR], ids=["ideal", "lag", "lag within a sample", "motor"])
 def test_a_table_that_says_the_same_everywhere_changes_nothing(drive):
     plain = Mode(40.0, 0.03, 0.7)
     same = replace(plain, table=ModeTable("z", (0.0, 100.0), (40.0, 40.0), (0.03, 0.03)))
@@ -184,6 +185,16 @@ def test_along_a_motion_the_table_is_followed(drive, axis):
     bent = naive.vibration_over_position(stage.axes, joint, rate, response.drive[:n], T)
     assert np.abs(bent).max() > 1e-3
     assert_allclose((response.tool - response.position)[:n], bent, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("drive", [*DRIVES, MOTOR], ids=["ideal", "lag", "lag within a sample", "motor"])
+def test_where_the_axis_rests_the_mode_is_that_of_the_place(drive):
+    command, loop = moving(seconds=0.2, reach=0.0), Control(T, 20.0, 0, Feedforward(1.0, 1.0))
+    command = replace(command, position=frozen(command.position + np.array([0.0, 0.0, 70.0])))
+    found = simulate(command, machine(drive), loop)
+    expected = simulate(command, machine(drive, SHAPED_AT.standing(70.0)), loop)
+    assert np.abs(expected.tool - expected.position).max() > 0.01
+    assert_allclose(found.tool, expected.tool, rtol=0.0, atol=1e-12 if drive != MOTOR else 1e-6)
 
 
 def test_an_axis_that_does_not_move_stands_at_zero():
@@ -225,10 +236,11 @@ def test_frozen_samples_converge_to_the_equation_whose_mode_moves():
     assert_allclose(coarse / fine, 2.0, rtol=0.05)
 
 
+@pytest.mark.parametrize("drive", [FirstOrderLag(0.0153, 0.993), MOTOR], ids=["lag", "motor"])
 @pytest.mark.parametrize("chunk", [1, 7, 64])
-def test_streamed_equals_whole_bit_for_bit(chunk):
+def test_streamed_equals_whole_bit_for_bit(chunk, drive):
     command = moving(seconds=0.2)
-    stage = machine(FirstOrderLag(0.0153, 0.993), more=(Mode(90.0, 0.01, 0.3),))
+    stage = machine(drive, more=(Mode(90.0, 0.01, 0.3),))
     step = simulating(stage, Control(T, 20.0, 1, Feedforward(1.0, 1.0), CrossCoupling(20.0)))
     state, parts = None, []
     for low in range(0, len(command), chunk):

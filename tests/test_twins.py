@@ -23,6 +23,7 @@ TWINS = {
     "kernels/decimals.py": ("Fraction", "test_decimals.py"),
     "kernels/extremes.py": ("naive.extremes", "test_recording.py"),
     "kernels/foot_point.py": ("naive.polyline_distance", "test_contour.py"),
+    "kernels/frames.py": ("naive.path_frames", "test_loading.py"),
     "kernels/hats.py": ("naive.hat_widths", "test_smoothing.py"),
     "kernels/kinematics_delta.py": ("naive.trilateration", "test_kinematics.py"),
     "kernels/kinematics_legs.py": ("naive.leg_joints", "test_kinematics.py"),
@@ -30,6 +31,7 @@ TWINS = {
     "kernels/knots.py": ("naive.knots", "test_shaped_programs.py"),
     "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
     "kernels/linear.py": ("np.linalg", "test_kinematics.py"),
+    "kernels/noise.py": ("naive.normal_noise", "test_noise.py"),
     "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),
     "kernels/path_limits.py": ("naive.path_excesses", "test_path_limits.py"),
     "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python

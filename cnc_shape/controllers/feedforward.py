@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kernels import kernel
-from cnc_shape.machine import Axis, FirstOrderLag
+from cnc_shape.machine import Axis, FirstOrderLag, ServoMotor
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +26,18 @@ class FeedforwardGains(NamedTuple):
 
     velocity: FloatArray  # (j,) velocity share / gain
     acceleration: FloatArray  # (j,) s, acceleration share * time constant / gain
+    torque: FloatArray  # (j,) N m s^2 per mm or rad, acceleration share * inertia / pitch of a servo motor
 
 
 def gains(feedforward: Feedforward, axes: Sequence[Axis]) -> FeedforwardGains:
-    """Gains of every axis: a lag drive needs ``u = (v + tau a) / k`` (spec: contour control, section 3.5)."""
+    """Gains of every axis: a lag drive needs ``u = (v + tau a) / k`` (spec: contour control, section 3.5).
+
+    A servo motor needs the velocity and the torque of its believed inertia, unless a time constant is given
+    for its velocity loop.
+    """
     velocity: list[float] = []
     acceleration: list[float] = []
+    torque: list[float] = []
     for axis in axes:
         own = axis.drive if isinstance(axis.drive, FirstOrderLag) else FirstOrderLag(0.0)
         gain = own.gain if feedforward.model_gain is None else feedforward.model_gain
@@ -40,15 +46,26 @@ def gains(feedforward: Feedforward, axes: Sequence[Axis]) -> FeedforwardGains:
         )
         velocity.append(feedforward.velocity / gain)
         acceleration.append(feedforward.acceleration * tau / gain)
-    return FeedforwardGains(frozen(velocity), frozen(acceleration))
+        needed = 0.0
+        if isinstance(axis.drive, ServoMotor) and feedforward.model_time_constant is None:
+            needed = axis.drive.believed_inertia / axis.drive.pitch
+        torque.append(feedforward.acceleration * needed)
+    return FeedforwardGains(frozen(velocity), frozen(acceleration), frozen(torque))
 
 
 @kernel
-def step(gains: FeedforwardGains, velocity: FloatArray, acceleration: FloatArray, drive: FloatArray) -> None:
+def step(
+    gains: FeedforwardGains,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    drive: FloatArray,
+    torque: FloatArray,
+) -> None:
     """Add the model's input for the coming sample.
 
     velocity (j,) mm/s and acceleration (j,) mm/s^2 are averages over the coming sample: the value at
-    its start alone is half a sample late. drive (j,) mm/s.
+    its start alone is half a sample late. drive (j,) mm/s; torque (j,) N m is set.
     """
     for j in range(drive.size):
         drive[j] += gains.velocity[j] * velocity[j] + gains.acceleration[j] * acceleration[j]
+        torque[j] = gains.torque[j] * acceleration[j]

@@ -6,6 +6,9 @@ plant runs to the next sample with that command held. Every term stands behind a
 so that leaving one out is a line of configuration and costs nothing. A new term is its file and one
 line here.
 
+A servo motor has a velocity loop of its own, which runs `ticks` times between two samples. Its position is
+what its encoder reads; how stiff the velocity loop is to be is set once a sample.
+
 The loop runs in the joints of the machine. What cross-coupling needs of the kinematics is an array: the
 inverse Jacobian at the commanded poses. With it joint errors become Cartesian ones, and Cartesian velocities
 joint velocities. Where the joints are the axes there is none.
@@ -16,7 +19,17 @@ from typing import NamedTuple
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray
-from cnc_shape.controllers import cross_coupling, estimators, feedforward, position_loop
+from cnc_shape.controllers import (
+    cross_coupling,
+    disturbance_observer,
+    estimators,
+    feedforward,
+    friction_feedforward,
+    inertia_compensation,
+    inertia_identification,
+    position_loop,
+    servo_drive,
+)
 from cnc_shape.kernels import kernel, structure
 from cnc_shape.kernels.linear import solve
 
@@ -43,6 +56,32 @@ class Poses(NamedTuple):
     every: int  # ticks
 
 
+class Terms(NamedTuple):
+    """The terms of the loop."""
+
+    position: position_loop.PositionGains
+    feed: int  # 1: there is feedforward
+    feedforward: feedforward.FeedforwardGains
+    couple: int  # 1: there is cross-coupling
+    coupling: cross_coupling.CrossCouplingGains
+    friction: friction_feedforward.FrictionGains
+    observer: disturbance_observer.ObserverGains
+    compensation: inertia_compensation.CompensationGains
+    identification: inertia_identification.IdentificationGains
+
+
+class MotorMemory(NamedTuple):
+    """What servo motors and their controllers remember: a row for every joint."""
+
+    motor: FloatArray  # (j,8), columns of `servo_drive`
+    observer: FloatArray  # (j,6), columns of `disturbance_observer`
+    compensation: FloatArray  # (j,10), columns of `inertia_compensation`
+    identification: FloatArray  # (j,16), columns of `inertia_identification`
+    friction: FloatArray  # (j,) rad/s, lagged speed of the reference
+    late: FloatArray  # (delay,j) N m, torque fed forward that the drives have yet to hear, oldest first
+    clock: IntArray  # (1,) readings of the encoders so far
+
+
 class Memory(NamedTuple):
     """What the loop remembers from tick to tick; changed in place."""
 
@@ -51,24 +90,28 @@ class Memory(NamedTuple):
     frame: FloatArray  # (2,3) unit tangent of the command, its curvature in 1/mm
     coupling: FloatArray  # (3,3) of the cross-coupled controller
     cursor: IntArray  # (4,) of the search for foot points
+    motors: MotorMemory
+
+
+TORQUE, LOAD, ESTIMATE, RATIO, EFFECTIVE, AGREEMENT, INERTIA = range(7)  # columns of the motors' signals
+SIGNALS = 7
 
 
 @kernel
-def servo_loop(
-    command, poses, path, lower, upper, sample_time, plant, position_gains, feed, feed_gains, couple,
-    couple_gains, memory,
-):  # fmt: skip
+def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, motors, terms, memory):
     """Run n ticks of the loop.
 
     command: a `Command`; poses: `Poses`; path, lower (n,), upper (n,) mm: the path and every tick's window on
-    it, where foot points are asked for; plant: a `Plant` of the joints; feed, couple: 1 where that term
-    acts; memory: a `Memory`. Returns joint, its rate, tool and velocity command, (n,j) each, and the ticks
-    run: fewer than n where the loop diverged.
+    it, where foot points are asked for; load (n,ticks,j) N m on the motors at every tick of theirs, or
+    without rows; plant: a `Plant` of the joints; motors: `Motors`; terms: `Terms`; memory: a `Memory`.
+    Returns joint, its rate, tool and velocity command, (n,j) each, the signals of the motors (n,j,7), without
+    rows where there are none, and the ticks run: fewer than n where the loop diverged.
     """
     position, velocity, acceleration, reference, reference_velocity = command
     inverse, phase, every = poses
     transition, held, rising, states, ideal, varying = plant
-    state, late, frame, coupling, cursor = memory
+    position_gains, feed, feed_gains, couple, couple_gains, friction, observer, compensate, identify = terms
+    state, late, frame, coupling, cursor, turning = memory
     n, joints = reference.shape[0] - 1, reference.shape[1]
     linear = min(3, position.shape[1])
     cartesian = inverse.shape[0] == 0
@@ -77,11 +120,16 @@ def servo_loop(
     tool, drive = np.empty((n, joints)), np.empty((n, joints))
     mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints)
     following = np.zeros(max(joints, 3))
-    told = np.empty(joints)
+    told, fed = np.empty(joints), np.zeros(joints)
+    servo = motors.servo.any()
+    signals = np.zeros((n if servo else 0, joints, SIGNALS))
     tracking = following if cartesian else np.zeros(max(joints, 3))
     coupled, work = following[:solved], np.empty((solved, solved))
     error, speed = np.zeros(3), np.zeros(3)
-    searched = n if couple and couple_gains.estimator == FOOT_POINT else 0
+    at_foot = couple and couple_gains.estimator == FOOT_POINT
+    known = servo and compensate.models and lower.size > 0
+    searched = n if at_foot or known else 0
+    foot = np.zeros(3)
     tools, feet = np.empty((searched, 3)), np.empty((searched, 3))
     distance, place, segment = np.empty(searched), np.empty(searched), np.empty(searched, np.int64)
     for k in range(n):
@@ -92,24 +140,29 @@ def servo_loop(
                 tool[k, j] += state[j, i]
             following[j] = reference[k, j] - state[j, 0]
             if not abs(following[j]) <= FURTHEST:
-                return joint, rate, tool, drive, k
+                return joint, rate, tool, drive, signals, k
+            if motors.servo[j]:
+                servo_drive.measure(motors, j, turning.clock[0], turning.motor)
+                following[j] = reference[k, j] - motors.pitch[j] * turning.motor[j, servo_drive.READ]
             told[j] = 0.0
         position_loop.step(position_gains, following, told)
         if feed:
             for j in range(joints):
                 mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
                 mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
-            feedforward.step(feed_gains, mean_velocity, mean_acceleration, told)
+            feedforward.step(feed_gains, mean_velocity, mean_acceleration, told, fed)
+        row = 0 if cartesian else (phase + k) // every
+        if (couple or known) and not cartesian:
+            solve(inverse[row], coupled, tracking, work)
+        if searched:
+            estimators.foot_error(
+                position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment, foot
+            )
         if couple:
             estimators.look_ahead(velocity, acceleration, k, couple_gains.estimator == CIRCLE, frame)
-            row = 0 if cartesian else (phase + k) // every
-            if not cartesian:
-                solve(inverse[row], coupled, tracking, work)
             if couple_gains.estimator == FOOT_POINT:
-                estimators.foot_error(
-                    position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment,
-                    error,
-                )  # fmt: skip
+                for i in range(3):
+                    error[i] = foot[i]
             elif couple_gains.estimator == CIRCLE:
                 estimators.circle_error(tracking, frame, error)
             else:
@@ -142,6 +195,43 @@ def servo_loop(
                     for i in range(late.shape[0] - 1):
                         late[i, j] = late[i + 1, j]
                     late[late.shape[0] - 1, j] = told[j]
+            if motors.servo[j]:
+                deviation = 0.0
+                if known and cartesian:
+                    deviation = -foot[j] if j < 3 else 0.0
+                elif known and j < solved:
+                    for i in range(3):
+                        deviation -= inverse[row, j, i] * foot[i]
+                torque = fed[j]
+                if late.shape[0] > 0:
+                    waiting = turning.late
+                    torque = waiting[0, j]
+                    for i in range(late.shape[0] - 1):
+                        waiting[i, j] = waiting[i + 1, j]
+                    waiting[late.shape[0] - 1, j] = fed[j]
+                watched, compensated = turning.observer, turning.compensation
+                if compensate.acts:
+                    inertia_compensation.step(compensate, motors, j, deviation, known, watched, compensated)
+                if identify.acts:
+                    inertia_identification.step(identify, motors, j, watched, turning.identification)
+                if friction.acts:
+                    turns = (reference[k + 1, j] - reference[k, j]) / sample_time / motors.pitch[j]
+                    friction_feedforward.follow(friction, j, turns, turning.friction)
+                signals[k, j, TORQUE] = turning.motor[j, servo_drive.ASKED]
+                if load.shape[0] > 0:
+                    signals[k, j, LOAD] = load[k, 0, j]
+                signals[k, j, ESTIMATE] = watched[j, disturbance_observer.LOAD]
+                signals[k, j, RATIO] = compensated[j, inertia_compensation.RATIO]
+                signals[k, j, EFFECTIVE] = compensated[j, inertia_compensation.INERTIA]
+                signals[k, j, AGREEMENT] = compensated[j, inertia_compensation.AGREEMENT]
+                signals[k, j, INERTIA] = inertia_identification.inertia(
+                    identify, motors, j, turning.identification
+                )
+                servo_drive.sample_step(
+                    motors, j, turning.clock[0], c0 / motors.pitch[j], torque, friction, observer, compensate,
+                    identify, load, k, state, s, transition, held, varying, joint[k], turning,
+                )  # fmt: skip
+                continue
             # the drive answers itself alone, a mode the drive and itself: all else in `transition` is zero
             q, v = state[j, 0], state[j, 1]
             for i in range(2, s, 2):
@@ -163,4 +253,5 @@ def servo_loop(
             if ideal[j]:
                 state[j, 0] = reference[k + 1, j]
                 state[j, 1] = reference_velocity[k + 1, j]
-    return joint, rate, tool, drive, n
+        turning.clock[0] += motors.ticks
+    return joint, rate, tool, drive, signals, n

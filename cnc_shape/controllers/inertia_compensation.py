@@ -1,0 +1,171 @@
+# pyright: basic
+"""Inertia compensation: the velocity gain follows the load (paper 003, read consistently).
+
+The paper takes load torque over acceleration for a varying inertia (eq 7), asks how much of the contour error
+the load's displacement explains (eqs 8-14), and sets the velocity gain by both (eqs 15-17). As printed its
+signs, units and inverses contradict one another; here (spec: inertia compensation, sections 1 and 3)
+
+    J_hat = max(|I_T| - deadband, 0) / (|I_a| + a0)     I: leaky windows of the observed load and acceleration
+    dP    = what the closed loop yields to the observed load, a model of it run beside it
+    A     = -<dP, P - foot> / <dP, dP>                  -1 where the model explains the contour error
+    ratio = 1 + clip(-A, 0, 1) J_hat / J                up to the largest, up fast and down slowly
+
+The gain is 1 without load, to the bit. What is raised is stiffness: the true inertia hardly matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp
+from typing import NamedTuple
+
+import numpy as np
+
+from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.controllers import disturbance_observer as watching
+from cnc_shape.controllers.compensation import GainLaw, InertiaCompensation
+from cnc_shape.kernels import kernel
+from cnc_shape.machine import Axis, ServoMotor
+
+ANGLE, SPEED, HOLDING = 0, 1, 2  # columns of the memory: model of the yielding loop, rad, rad/s, N m
+RATIO = 3  # of the velocity gain to its nominal one
+LOAD, ACCELERATION = 4, 5  # leaky windows, N m, rad/s^2
+CROSS, SQUARE = 6, 7  # sums of displacement times contour error, and squared, mm^2
+AGREEMENT = 8  # -A
+INERTIA = 9  # effective, above the believed one, kg m^2
+COLUMNS = 10
+ENOUGH = 1e-7  # mm^2, sum of squared displacements from which on agreement is told
+SMALLEST_RATIO = 0.1  # of the literal readings
+DEADBAND = 1.5  # of Coulomb friction
+MILLISECOND = 1e-3  # s, for which forgetting is told
+LITERAL, LITERAL_INVERSE = GainLaw.LITERAL.value, GainLaw.LITERAL_INVERSE.value
+FIXED, TRIGGERED = GainLaw.FIXED.value, GainLaw.TRIGGERED.value
+
+
+class CompensationGains(NamedTuple):
+    """The compensation of every motor."""
+
+    acts: int
+    models: int  # 1: the displacement under load is modelled
+    law: int  # value of a `GainLaw`
+    largest: float  # -
+    deadband: FloatArray  # (j,) N m
+    regularisation: FloatArray  # (j,) rad/s^2
+    window: float  # -, share of what is new in a leaky window, a sample
+    attack: float  # -, a sample
+    release: float  # -, a sample
+    forgetting: float  # -, a sample
+    scales_integral: int
+    threshold: float  # mm
+    slope: float  # rad/s per N m
+    position_gain: FloatArray  # (j,) 1/s
+
+
+def gains(
+    term: InertiaCompensation | None,
+    joints: Sequence[Axis],
+    position_gain: Sequence[float],
+    sample_time: float,
+) -> CompensationGains:
+    """Gains for the motors of a machine's joints."""
+    given = term or InertiaCompensation()
+    deadband = [_deadband(given, joint) for joint in joints]
+    return CompensationGains(
+        int(term is not None),
+        int(term is not None and given.law is not GainLaw.FIXED),
+        given.law.value,
+        given.max_gain_ratio,
+        frozen(deadband),
+        frozen([_regularisation(given, joint, dead) for joint, dead in zip(joints, deadband, strict=True)]),
+        _share(given.window, sample_time),
+        _share(given.attack, sample_time),
+        _share(given.release, sample_time),
+        given.forgetting ** (sample_time / MILLISECOND),
+        int(given.scale_integral_time),
+        given.threshold,
+        given.torque_speed_slope,
+        frozen(position_gain),
+    )
+
+
+def start(term: InertiaCompensation | None, joints: int) -> FloatArray:
+    """Memory at rest, (j,10)."""
+    memory = np.zeros((joints, COLUMNS))
+    memory[:, RATIO] = term.max_gain_ratio if term is not None and term.law is GainLaw.FIXED else 1.0
+    memory[:, AGREEMENT] = 1.0
+    return memory
+
+
+def _share(time_constant: float, sample_time: float) -> float:
+    return 1.0 - exp(-sample_time / time_constant) if time_constant > 0.0 else 1.0
+
+
+def _deadband(term: InertiaCompensation, joint: Axis) -> float:
+    if term.deadband is not None:
+        return term.deadband
+    return DEADBAND * joint.drive.coulomb if isinstance(joint.drive, ServoMotor) else 0.0
+
+
+def _regularisation(term: InertiaCompensation, joint: Axis, deadband: float) -> float:
+    if term.regularisation is not None:
+        return term.regularisation
+    return deadband / joint.drive.believed_inertia if isinstance(joint.drive, ServoMotor) else 0.0
+
+
+@kernel
+def displace(gains, motors, observer, j, load, memory):
+    """Move the model of the yielding loop on by a tick under an observed load (N m). memory (j,10)."""
+    period = motors.period
+    ratio = memory[j, RATIO]
+    gain = motors.proportional[j] * ratio
+    stiffening = ratio if gains.scales_integral else 1.0
+    error = -gains.position_gain[j] * memory[j, ANGLE] - memory[j, SPEED]
+    memory[j, HOLDING] += gain * motors.integral[j] * stiffening * error
+    driving = gain * error + memory[j, HOLDING] - (1.0 - observer.feedforward) * load
+    memory[j, SPEED] += period / motors.believed[j] * driving
+    memory[j, ANGLE] += period * memory[j, SPEED]
+
+
+@kernel
+def step(gains, motors, j, deviation, known, watched, memory):
+    """Set the gain ratio of motor j for the coming sample.
+
+    deviation mm: where the joint is minus where the nearest point of the path would have it; known: 1 where
+    there is a path; watched (j,6) of the observer; memory (j,10).
+    """
+    believed = motors.believed[j]
+    load = watched[j, watching.LOAD]
+    acceleration = watching.acceleration(motors, j, watched)
+    memory[j, LOAD] += gains.window * (load - memory[j, LOAD])
+    memory[j, ACCELERATION] += gains.window * (acceleration - memory[j, ACCELERATION])
+    displacement = motors.pitch[j] * memory[j, ANGLE]
+    if known:
+        memory[j, CROSS] = gains.forgetting * memory[j, CROSS] + displacement * deviation
+        memory[j, SQUARE] = gains.forgetting * memory[j, SQUARE] + displacement * displacement
+        if memory[j, SQUARE] > ENOUGH:
+            memory[j, AGREEMENT] = memory[j, CROSS] / memory[j, SQUARE]
+        else:
+            memory[j, AGREEMENT] = 1.0
+    share = min(max(memory[j, AGREEMENT], 0.0), 1.0)
+    excess = max(abs(memory[j, LOAD]) - gains.deadband[j], 0.0)
+    pace = abs(memory[j, ACCELERATION]) + gains.regularisation[j]
+    inertia = excess / pace if excess > 0.0 else 0.0
+    memory[j, INERTIA] = inertia
+    bandwidth = motors.proportional[j] / believed
+    smallest = 1.0
+    if gains.law == FIXED:
+        wanted = gains.largest
+    elif gains.law == TRIGGERED:
+        wanted = gains.largest if abs(displacement) > gains.threshold else 1.0
+    elif gains.law == LITERAL:
+        smallest = SMALLEST_RATIO
+        wanted = 0.5 * gains.slope * share * (believed + inertia) / bandwidth
+    elif gains.law == LITERAL_INVERSE:
+        smallest = SMALLEST_RATIO
+        time_constant = gains.slope * share * (believed + inertia)
+        wanted = 2.0 / time_constant / bandwidth if time_constant > 0.0 else gains.largest
+    else:
+        wanted = 1.0 + share * inertia / believed
+    wanted = min(max(wanted, smallest), gains.largest)
+    ratio = memory[j, RATIO]
+    memory[j, RATIO] = ratio + (wanted - ratio) * (gains.attack if wanted > ratio else gains.release)
