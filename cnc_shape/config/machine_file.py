@@ -23,7 +23,8 @@ from cnc_shape.config.models import (
     RotaryAxisModel,
 )
 from cnc_shape.config.planning import planning_of
-from cnc_shape.config.setup import Setup, ShaperChoice
+from cnc_shape.config.position_notes import position_notes
+from cnc_shape.config.setup import Setup, ShaperChoice, Shaping
 from cnc_shape.config.shaper_options import NONE, design, key_of
 from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refuse
 from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
@@ -98,14 +99,21 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     if not axes:
         refuse(source, locate(tree, ("axes",))[0], "axes: a machine needs an axis", "add x: with its limits")
     choices = {name: choice for name, axis in axes.items() if (choice := _choice(axis))}
-    notes = (*_jerk_note(tree, axes), *_single_mode_notes(tree, machine, choices))
+    planning = planning_of(source, tree, model.planning)
+    shapers = {name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()}
+    acting = {} if planning.shaping is Shaping.NONE else shapers
+    notes = (
+        *_jerk_note(tree, axes),
+        *_single_mode_notes(tree, machine, choices),
+        *position_notes(tree, machine, acting, choices),
+    )
     setup = Setup(
         machine=machine,
-        planning=planning_of(source, tree, model.planning),
+        planning=planning,
         control=read_control(source, tree, model.control, kinematics),
         tools=_tools(source, tree, model),
         choices=choices,
-        shapers={name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()},
+        shapers=shapers,
         kinematics_choice=kind,
         kinematics=kinematics,
         loop_place=_loop_place(tree),
