@@ -12,7 +12,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kinematics import Kinematics, cartesian
-from cnc_shape.machine import LINEAR_DEFAULT, Axis, IdealDrive, Machine
+from cnc_shape.machine import LINEAR_DEFAULT, Axis, IdealDrive, Machine, ServoMotor
 
 CARTESIAN = cartesian()
 
@@ -73,6 +73,23 @@ class Joints:
             return velocity
         rates = np.einsum("nja,na->nj", self.inverse_jacobian(pose), velocity[:, : self.coupled])
         return frozen(np.hstack([rates, velocity[:, self.coupled :]]))
+
+    def torques(self, pose: FloatArray, load: FloatArray) -> FloatArray:
+        """Torques on the motors of all joints (n,t,j) that hold torques over the axes (n,t,d), at poses (n,p).
+
+        Over an axis, a torque is that of a motor whose screw is like the first joint's. Where joints are axes
+        each motor holds its own; elsewhere what they do together must do the same work.
+        """
+        if self.cartesian:
+            return load
+        over = np.zeros((*load.shape[:2], len(self.drives)))
+        over[:, :, self.columns] = load
+        across = self.inverse_jacobian(pose).transpose(0, 2, 1)[:, None]
+        over[:, :, : self.coupled] = np.linalg.solve(across, over[:, :, : self.coupled, None])[..., 0]
+        drives = [joint.drive for joint in self.drives]
+        pitches = [drive.pitch if isinstance(drive, ServoMotor) else 0.0 for drive in drives]
+        first = next((pitch for pitch in pitches if pitch > 0.0), 1.0)
+        return frozen(over * (np.array(pitches) / first))
 
     def forward(self, joint: FloatArray, near: FloatArray) -> FloatArray:
         """Poses (n,p) of joints (n,j), each near a pose."""

@@ -23,6 +23,7 @@ from cnc_shape.controllers.loop import SIGNALS, Command, Memory, Poses
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
+from cnc_shape.loading import LoadState, loading
 from cnc_shape.machine import Machine
 from cnc_shape.refusals import (
     check_on_the_way,
@@ -33,7 +34,16 @@ from cnc_shape.refusals import (
 )
 from cnc_shape.response import MotorSignals, Response
 from cnc_shape.segments import path_table
-from cnc_shape.servo import NO_POSES, PathWindows, Ticks, copied, make_loop, settling_time, structure_of
+from cnc_shape.servo import (
+    NO_POSES,
+    UNLOADED,
+    PathWindows,
+    Ticks,
+    copied,
+    make_loop,
+    settling_time,
+    structure_of,
+)
 from cnc_shape.toolpath import Toolpath
 from cnc_shape.trajectory import Trajectory, join_trajectories
 from cnc_shape.windows import Reach, Windows, WindowState, foot_reach, windowing
@@ -54,6 +64,7 @@ class SimulationState:
     before: FloatArray  # (1,j) mm or rad, what the drives were told last; (0,) before the first
     inverse: FloatArray  # (1,c,c) inverse Jacobian in use, (0,c,c) before the first
     windows: WindowState | None
+    load: LoadState | None  # None before the first sample
     source: str  # of the toolpath
     settling: FloatArray  # (m,d) mm or rad, tool minus drive at and after the end; (0,d) before
 
@@ -149,7 +160,6 @@ class _Stage:
         reach: Reach,
         disturbances: Disturbances,
     ) -> None:
-        self._disturbances = disturbances
         self._control, self._joints, self._period = control, joints, control.sample_time
         self._watched = _residual_ticks(machine, control)
         self._loop = make_loop(joints, control, disturbances.noise)
@@ -160,6 +170,10 @@ class _Stage:
         self._needs_path = coupling is not None and coupling.estimator is Estimator.FOOT_POINT
         self._searches = self._needs_path or explained
         self._coupled = (coupling is not None or self._searches) and not joints.cartesian
+        self._loading = None
+        if self._servo and disturbances.loads:
+            axes = tuple(axis.name for axis in machine.axes)
+            self._loading = loading(disturbances, axes, self._period, self._loop.motors.ticks)
         self._windows = None
         if self._searches or not joints.cartesian:
             self._windows = windowing(replace(reach, ahead=max(reach.ahead, 1)))
@@ -188,7 +202,8 @@ class _Stage:
         poses, inverse = self._poses(now, pose, ticks)
         if self._coupled and self._control.cross_coupling is not None:
             check_on_the_way(self._joints, self._control, pose, told.velocity, now.ticks, lines, source)
-        ran = self._loop.run(now.loop, told, poses, self._path(windows))
+        load, torque = self._torque(now, pose, command, ticks)
+        ran = self._loop.run(now.loop, told, poses, self._path(windows), torque)
         before = now.ticks * self._period
         refuse_divergence(self._joints, told.reference, ran, before, self._period, source)
         position, tool, turn = self._axes(now, pose, ran)
@@ -196,7 +211,9 @@ class _Stage:
             command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
             ran.drive, turn, self._signals(ran),
         )  # fmt: skip
-        now = replace(now, ticks=now.ticks + ticks, before=told.reference[ticks - 1 : ticks], inverse=inverse)
+        now = replace(
+            now, ticks=now.ticks + ticks, before=told.reference[ticks - 1 : ticks], inverse=inverse, load=load
+        )
         if last:
             ending = tool[-1:] - position[-1:]
             now = replace(now, settling=self._settle(now, poses, told, windows, ending))
@@ -215,7 +232,7 @@ class _Stage:
         bent = None if self._structure is None else self._structure.start(np.zeros(len(command.axes)))
         none = frozen(np.zeros((0, self._joints.coupled, self._joints.coupled)))
         return SimulationState(
-            nowhere, bent, False, command.cut(slice(0, 0)), 0, frozen([]), none, None, "",
+            nowhere, bent, False, command.cut(slice(0, 0)), 0, frozen([]), none, None, None, "",
             frozen(np.zeros((0, len(command.axes)))),
         )  # fmt: skip
 
@@ -280,6 +297,15 @@ class _Stage:
             return PathWindows()
         return PathWindows(path_table(windows.path), windows.lower, windows.upper)
 
+    def _torque(
+        self, now: SimulationState, pose: FloatArray, command: Trajectory, ticks: int
+    ) -> tuple[LoadState | None, FloatArray]:
+        """What loads the motors, (ticks, velocity ticks, j) N m, or without rows."""
+        if self._loading is None:
+            return None, UNLOADED
+        load, torque = self._loading(now.load, command, ticks)
+        return load, self._joints.torques(pose[:ticks], torque)
+
     def _signals(self, ran: Ticks) -> MotorSignals | None:
         """What the servo motors did, if there are any."""
         if not self._servo:
@@ -318,12 +344,15 @@ class _Stage:
         still, quiet = np.zeros_like(position), np.zeros_like(reference)
         rest = Command(frozen(position), frozen(still), frozen(still), frozen(reference), frozen(quiet))
         last = Poses(frozen(poses.inverse[-1:]), 0, n + 1) if len(poses.inverse) else NO_POSES
-        path = self._path(windows)
+        pose, path = self._joints.pose(rest.position), self._path(windows)
         around = PathWindows(
             path.path, frozen(np.repeat(path.lower[-1:], n)), frozen(np.repeat(path.upper[-1:], n))
         )
-        ran = self._loop.run(now.loop, rest, last, around)
-        position, tool, _ = self._axes(now, self._joints.pose(rest.position), ran)
+        load = UNLOADED
+        if self._loading is not None and now.load is not None:
+            load = self._joints.torques(pose[:n], self._loading.at_rest(now.load, n))
+        ran = self._loop.run(now.loop, rest, last, around, load)
+        position, tool, _ = self._axes(now, pose, ran)
         return frozen(np.vstack([ending, tool - position]))
 
 
