@@ -23,7 +23,7 @@ from cnc_shape.errors import ConfigError, OptionError
 from cnc_shape.kernels.structure import standing, swing
 from cnc_shape.kinematics import corexy
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine, ServoMotor
+from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine, ServoMotor, VelocityLoop
 from cnc_shape.modes import Mode, ModeTable
 from cnc_shape.plant import discretise
 from cnc_shape.shapers import zv
@@ -185,6 +185,19 @@ def test_along_a_motion_the_table_is_followed(drive, axis):
     bent = naive.vibration_over_position(stage.axes, joint, rate, response.drive[:n], T)
     assert np.abs(bent).max() > 1e-3
     assert_allclose((response.tool - response.position)[:n], bent, rtol=0.0, atol=1e-11)
+
+
+def test_behind_a_motor_the_table_is_followed():
+    """With one tick a sample the motor's speed follows from its positions, between which it is linear."""
+    stage = machine(replace(MOTOR, velocity_loop=VelocityLoop(sample_time=T)))
+    response = simulate(moving(seconds=0.2), stage, Control(T, 20.0, 0, Feedforward(1.0, 1.0)))
+    rate = np.zeros_like(response.joint)
+    for k, step in enumerate(np.diff(response.joint, axis=0)):
+        rate[k + 1] = 2.0 * step / T - rate[k]
+    n = len(rate) - 1
+    bent = naive.vibration_over_position(stage.axes, response.joint, rate, response.drive[:n], T)
+    assert np.abs(bent).max() > 0.05
+    assert_allclose((response.tool - response.position)[:n], bent, rtol=0.0, atol=1e-7)
 
 
 @pytest.mark.parametrize("drive", [*DRIVES, MOTOR], ids=["ideal", "lag", "lag within a sample", "motor"])
