@@ -73,7 +73,9 @@ def test_a_motor_at_its_limit_is_a_warning_with_joint_case_and_share():
     )
     rows = (case("independent", 0.1, 0.1, 1.0), replace(case("loaded", 0.1, 0.1, 1.0), motors=motors))
     (told,) = saturations(summary(*rows))
-    assert told.startswith("loaded: torque at its limit, motor X for 3.21 %, motor Z for 100 % of the time")
+    assert told == (
+        "loaded: torque limit reached by motor X for 3.21 %, motor Z for 100 % of the time; the loop is open then"
+    )
 
 
 def test_the_worst_places_of_a_disturbed_case_are_told_against_the_first_disturbed_one():
