@@ -35,15 +35,7 @@ from cnc_shape.refusals import (
 )
 from cnc_shape.response import Response, motor_signals
 from cnc_shape.segments import path_table
-from cnc_shape.servo import (
-    NO_POSES,
-    UNLOADED,
-    PathWindows,
-    Ticks,
-    make_loop,
-    settling_time,
-    structure_of,
-)
+from cnc_shape.servo import NO_POSES, UNLOADED, PathWindows, Ticks, make_loop, settling_time, structure_of
 from cnc_shape.simulation_state import SimulationState, copied_state
 from cnc_shape.toolpath import Toolpath
 from cnc_shape.trajectory import Trajectory, join_trajectories
@@ -225,17 +217,9 @@ class _Stage:
 
     def _nothing(self, command: Trajectory) -> Response:
         none = frozen(np.zeros((0, len(self._joints.drives))))
-        idle = Ticks(none, none, none, none, frozen(np.zeros((0, len(self._joints.drives), SIGNALS))), 0)
-        return Response(
-            command,
-            none,
-            none,
-            command.position,
-            command.position,
-            none,
-            frozen([]),
-            motor_signals(self._joints, idle),
-        )
+        idle = Ticks(none, none, none, none, frozen(np.zeros((*none.shape, SIGNALS))), 0)
+        motors = motor_signals(self._joints, idle)
+        return Response(command, none, none, command.position, command.position, none, frozen([]), motors)
 
     def _poses(self, now: SimulationState, pose: FloatArray, ticks: int) -> tuple[Poses, FloatArray]:
         """Inverse Jacobians for some ticks, and the one in use at their end."""

@@ -42,7 +42,11 @@ from cnc_shape.trajectory import Trajectory
 from cnc_shape.writers.points import points_file, points_of
 from cnc_shape.writers.program import write_program
 
-MACHINES = ("xy_stage.yaml", "mill_three_axis.yaml")  # ideal and lagging drives, with modes and without
+MACHINES = (  # ideal and lagging drives and motors, with modes and without, under loads and not
+    "xy_stage.yaml",
+    "mill_three_axis.yaml",
+    "servo_three_axis.yaml",
+)
 SMALL_CHUNK = 4  # rows, so that every stage is entered with a state
 LINES = """G21 G90 G64 P0.02
 G1 X10 F3000

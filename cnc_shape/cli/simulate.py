@@ -38,7 +38,11 @@ def simulate(
         typer.Option("--all-signals", help="With --report: every sample in signals.npz, however many."),
     ] = False,
     cases: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Rows of the table, such as unshaped,shaped.")
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="Rows of the table, such as unshaped,shaped+cross_coupled or independent+disturbed.",
+        ),
     ] = None,
     fail_on: Annotated[
         list[str] | None,
