@@ -9,6 +9,7 @@ import pytest
 from answers import answer
 from archives import arrays_of
 
+import cnc_shape as cs
 from cnc_shape.cli import run
 from cnc_shape.config.bundled import bundled
 
@@ -59,6 +60,12 @@ def test_a_motor_at_its_limit_is_told_on_stderr_and_on_the_page(place, capfd):
     assert warning in json.loads((place / "out" / "run.json").read_text())["warnings"]
     assert run(["simulate", "part.nc", "-m", "weak.yaml", *picked, "--quiet"]) == 0
     assert "torque limit" not in capfd.readouterr().err
+
+
+def test_a_report_from_python_has_the_same_warning(place):
+    setup = cs.load_machine("weak.yaml")
+    told = cs.simulate_program("part.nc", setup, ["independent+disturbed"])
+    assert "torque limit reached by motor X" in cs.write_report(told, place / "out", setup).read_text()
 
 
 def test_the_machine_of_a_run_folder_runs_it_again_bit_for_bit(place, capfd):
