@@ -13,7 +13,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.setup import Setup
-from cnc_shape.controllers import Control, CrossCoupling, DisturbanceObserver, GainLaw, InertiaCompensation
+from cnc_shape.controllers import (
+    Control,
+    CrossCoupling,
+    DisturbanceObserver,
+    GainLaw,
+    InertiaCompensation,
+    stability,
+)
 from cnc_shape.controllers.loop import Command
 from cnc_shape.controllers.loop_model import closed_loop, loop_model, loop_transfer, open_loop, poles
 from cnc_shape.controllers.margins import servo_margins, worst_margins
@@ -567,6 +574,30 @@ def test_mixed_drives_of_a_parallel_kinematics_are_refused_by_pose():
         check_along((*kinds[:2], turning(0.35), *kinds[3:]), compensated(2.5), poses, DIRECTIONS[:2])
     radius = np.abs(poles(kinds, beyond, poses[0], DIRECTIONS[0])).max()
     assert radius > 0.99
+
+
+def test_what_a_gain_may_grow_by_is_found_without_poles_too(monkeypatch):
+    """Poles and frequency response agree; the latter decides where delays are long."""
+    kinds = (turning(0.8), LAG, MOTOR)
+    loop = replace(observed(LOOP, 150.0), delay_samples=1, cross_coupling=CrossCoupling(10.0, integral=50.0))
+    by_poles = largest_stable_coupling(kinds, loop, np.eye(3)[None])
+    gain_by_poles = largest_stable_position_gain(MOTOR, loop)
+    monkeypatch.setattr(stability, "MOST_STATES", 0)
+    assert_allclose(largest_stable_coupling(kinds, loop, np.eye(3)[None]), by_poles, rtol=3e-5)
+    assert_allclose(largest_stable_position_gain(MOTOR, loop), gain_by_poles, rtol=3e-5)
+
+
+def test_a_very_long_delay_leaves_a_gain_in_closed_form():
+    """The motor is an integrator to it: the delay d T leaves pi/2 / (d T + T/2), but for the velocity loop."""
+    loop = replace(LOOP, position_gain=1.0, delay_samples=500)
+    found = largest_stable_position_gain(MOTOR, loop)
+    assert_allclose(found, 0.5 * np.pi / (500 * T + 0.5 * T), rtol=2e-3)
+    assert_allclose(limit(refused((MOTOR,), replace(loop, position_gain=4.0))), found, rtol=1e-3)
+
+
+def test_no_position_gain_holds_a_velocity_loop_that_does_not_settle():
+    assert largest_stable_position_gain(turning(0.35), compensated(2.5)) == 0.0
+    assert largest_stable_position_gain(IdealDrive(), LOOP) == np.inf
 
 
 # --- check and the rest ---------------------------------------------------------------------------

@@ -122,8 +122,15 @@ def largest_stable_coupling(
 
 
 def largest_stable_position_gain(drive: Drive, control: Control) -> float:
-    """Largest position gain with which a joint is stable by itself, 1/s; infinite for an ideal drive."""
-    return _largest_gain_of(drive, control)[0] if lags(drive) else np.inf
+    """Largest position gain with which a joint is stable by itself, 1/s.
+
+    Infinite for an ideal drive; 0 for a servo motor whose velocity loop does not settle.
+    """
+    if not lags(drive):
+        return np.inf
+    if not all(_settles(drive, at_ratio(control, ratio)) for ratio in gain_ratios((drive,), control)):
+        return 0.0
+    return _largest_gain_of(drive, control)[0]
 
 
 def cartesian_loop(axes: Sequence[Axis], control: Control) -> tuple[tuple[Axis, ...], Control]:
