@@ -19,7 +19,7 @@ from cnc_shape.controllers import (
     DisturbanceObserver,
     GainLaw,
     InertiaCompensation,
-    stability,
+    growth,
 )
 from cnc_shape.controllers.loop import Command
 from cnc_shape.controllers.loop_model import closed_loop, loop_model, loop_transfer, open_loop, poles
@@ -108,7 +108,7 @@ class Turning:
                 self.speed + h / J * drive + (3 * d**2 - d**3 / 2) / h * nu,
                 self.load - J * d**3 / h**2 * nu,
             )
-        steps = 40
+        steps = 25
         for _ in range(steps):
             self.x = self.runge_kutta(self.x, self.asked, h / steps)
         self.before, self.asked = y, asked
@@ -172,7 +172,7 @@ def test_the_model_goes_where_brute_force_goes(motor, observer):
     """Position loop included, sample by sample."""
     loop = replace(LOOP, disturbance_observer=observer)
     ticks = round(T / motor.velocity_loop.sample_time)
-    told = run_alone(Turning(motor, loop, 1.0, ticks=ticks), LOOP.position_gain, 60)
+    told = run_alone(Turning(motor, loop, 1.0, ticks=ticks), LOOP.position_gain, 30)
     transition = closed_loop(one(motor, loop))[0]
     state = np.zeros(len(transition))
     state[0] = told[0]
@@ -582,7 +582,7 @@ def test_what_a_gain_may_grow_by_is_found_without_poles_too(monkeypatch):
     loop = replace(observed(LOOP, 150.0), delay_samples=1, cross_coupling=CrossCoupling(10.0, integral=50.0))
     by_poles = largest_stable_coupling(kinds, loop, np.eye(3)[None])
     gain_by_poles = largest_stable_position_gain(MOTOR, loop)
-    monkeypatch.setattr(stability, "MOST_STATES", 0)
+    monkeypatch.setattr(growth, "MOST_STATES", 0)
     assert_allclose(largest_stable_coupling(kinds, loop, np.eye(3)[None]), by_poles, rtol=3e-5)
     assert_allclose(largest_stable_position_gain(MOTOR, loop), gain_by_poles, rtol=3e-5)
 
