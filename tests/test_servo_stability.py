@@ -597,6 +597,10 @@ def test_a_very_long_delay_leaves_a_gain_in_closed_form():
 
 def test_no_position_gain_holds_a_velocity_loop_that_does_not_settle():
     assert largest_stable_position_gain(turning(0.35), compensated(2.5)) == 0.0
+    fast = VelocityLoop(400.0, 0.01, 1e-6)  # grows beyond all numbers within one sample
+    wild = turning(1e-6, current_time_constant=0.0, velocity_loop=fast)
+    assert largest_stable_position_gain(wild, LOOP) == 0.0
+    assert "velocity loop" in str(refused((wild,), LOOP))
     assert largest_stable_position_gain(IdealDrive(), LOOP) == np.inf
 
 
@@ -616,9 +620,22 @@ def test_check_tells_the_worst_velocity_loop():
     assert_allclose(told["velocity_loop_gain_margin_db"], 20.0 * np.log10(worst.gain))
     assert_allclose(told["velocity_loop_phase_margin_deg"], worst.phase / DEGREE)
     assert_allclose(told["velocity_loop_max_sensitivity"], worst.sensitivity)
-    assert told["max_sensitivity"] >= worst_margins((MOTOR,), LOOP, np.eye(1), X[None]).sensitivity
     plain = check_loop(Setup(Machine("m", tuple(axes(MOTOR))), control=LOOP))
     assert_allclose(plain["velocity_loop_max_sensitivity"], 1.32, atol=0.005)
+
+
+@pytest.mark.parametrize(("law", "softest"), [(GainLaw.LITERAL, 0.1), (GainLaw.EFFECTIVE_INERTIA, 1.0)])
+def test_check_tells_the_worst_outer_loop_wherever_the_velocity_gain_may_be(law, softest):
+    """A soft velocity loop bears a position loop least."""
+    drives = (MOTOR, turning(1.5), LAG)
+    loop = replace(compensated(2.5, law), position_gain=20.0)
+    told = check_loop(Setup(Machine("m", tuple(axes(*drives))), control=loop))
+    softly, stiffly = (
+        worst_margins(drives, at_ratio(loop, ratio), np.eye(3), DIRECTIONS) for ratio in (softest, 2.5)
+    )
+    assert softly.gain < stiffly.gain
+    assert told["gain_margin"] == softly.gain
+    assert told["max_sensitivity"] == softly.sensitivity
 
 
 def test_check_has_nothing_to_tell_without_servo_motors():
