@@ -18,7 +18,7 @@ from cnc_shape.controllers.compensation import DisturbanceObserver
 from cnc_shape.kernels import kernel
 
 ANGLE, SPEED, LOAD = 0, 1, 2  # columns of an observer's memory: its estimates, rad, rad/s, N m
-GIVEN = 3  # the torque given, behind the same poles as the estimate: after one, two and all three of them
+ONCE, TWICE, THRICE = 3, 4, 5  # the torque given behind the same poles as the estimate: one, two, all three
 COLUMNS = 6
 
 
@@ -56,21 +56,21 @@ def start(reading: FloatArray) -> FloatArray:
 
 
 @kernel
-def step(gains, motors, j, torque, reading, memory):
-    """Take a reading (rad), and predict the next tick under a torque (N m). memory (j,6)."""
-    period, believed = motors.period, motors.believed[j]
-    surprise = reading - memory[j, ANGLE]
-    driven = period / believed * (torque - memory[j, LOAD])
-    memory[j, ANGLE] += period * (memory[j, SPEED] + 0.5 * driven) + gains.angle * surprise
-    memory[j, SPEED] += driven + gains.speed * surprise
-    memory[j, LOAD] += gains.load[j] * surprise
-    passing = torque
-    for i in range(GIVEN, COLUMNS):
-        memory[j, i] += (1.0 - gains.pole) * (passing - memory[j, i])
-        passing = memory[j, i]
+def predicted(gains, period, push, correction, torque, reading, angle, speed, load):
+    """Angle, speed and load that are expected at the next tick, after a reading (rad) and under a torque (N m).
+
+    push: believed speed per torque held for a tick, rad/s per N m; correction N m/rad: of the load.
+    """
+    surprise = reading - angle
+    driven = push * (torque - load)
+    return (
+        angle + period * (speed + 0.5 * driven) + gains.angle * surprise,
+        speed + driven + gains.speed * surprise,
+        load + correction * surprise,
+    )
 
 
 @kernel
 def acceleration(motors, j, memory):
     """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2."""
-    return (memory[j, COLUMNS - 1] - memory[j, LOAD]) / motors.believed[j]
+    return (memory[j, THRICE] - memory[j, LOAD]) / motors.believed[j]

@@ -113,17 +113,15 @@ def _regularisation(term: InertiaCompensation, joint: Axis, deadband: float) -> 
 
 
 @kernel
-def displace(gains, motors, observer, j, load, memory):
-    """Move the model of the yielding loop on by a tick under an observed load (N m). memory (j,10)."""
-    period = motors.period
-    ratio = memory[j, RATIO]
-    gain = motors.proportional[j] * ratio
-    stiffening = ratio if gains.scales_integral else 1.0
-    error = -gains.position_gain[j] * memory[j, ANGLE] - memory[j, SPEED]
-    memory[j, HOLDING] += gain * motors.integral[j] * stiffening * error
-    driving = gain * error + memory[j, HOLDING] - (1.0 - observer.feedforward) * load
-    memory[j, SPEED] += period / motors.believed[j] * driving
-    memory[j, ANGLE] += period * memory[j, SPEED]
+def yielded(period, push, position_gain, gain, growth, load, angle, speed, holding):
+    """Angle, speed and integral a tick later of a loop that yields to a load (N m), as the model has it.
+
+    push: believed speed per torque held for a tick, rad/s per N m; gain N m s and growth as of the velocity loop.
+    """
+    error = -position_gain * angle - speed
+    holding += gain * growth * error
+    speed += push * (gain * error + holding - load)
+    return angle + period * speed, speed, holding
 
 
 @kernel

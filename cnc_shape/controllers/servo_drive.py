@@ -121,48 +121,50 @@ def start(motors: Motors, reference: FloatArray) -> FloatArray:
 
 
 @kernel
-def measure(motors, j, tick, memory):
-    """Read the encoder of joint j; tick: number of the reading, for its noise. memory (j,8)."""
-    angle = memory[j, ANGLE]
+def reading(motors, j, tick, angle):
+    """What the encoder of joint j reads at an angle (rad), rad; tick: number of the reading, for its noise."""
     count = motors.count[j]
+    if count <= 0.0:
+        return angle
+    counts = angle / count
+    if motors.noise > 0.0:
+        counts += motors.noise * normal(motors.seed, j, tick)
+    return np.floor(counts + 0.5) * count
+
+
+@kernel
+def measure(motors, j, tick, memory):
+    """Read the encoder of joint j at a sample. memory (j,8)."""
     memory[j, BEFORE] = memory[j, READ]
-    if count > 0.0:
-        reading = angle / count
-        if motors.noise > 0.0:
-            reading += motors.noise * normal(motors.seed, j, tick)
-        angle = np.floor(reading + 0.5) * count
-    memory[j, READ] = angle
+    memory[j, READ] = reading(motors, j, tick, memory[j, ANGLE])
 
 
 @kernel
-def velocity_step(motors, j, command, ratio, stiffening, fed, memory):
-    """Torque that the velocity loop of joint j asks for, N m.
+def velocity_step(error, gain, growth, fed, limit, integral):
+    """Torque that a velocity loop asks for, and its integral, N m.
 
-    command rad/s; ratio: of the gain to its nominal one; stiffening: factor of the integral; fed N m: torque
-    fed forward; memory (j,8).
+    error rad/s; gain N m s; growth: of the integral in a tick, by gain and error; fed N m: torque fed forward;
+    limit N m.
     """
-    error = command - (memory[j, READ] - memory[j, BEFORE]) / motors.period
-    gain = motors.proportional[j] * ratio
-    step = gain * motors.integral[j] * stiffening * error
-    asked = gain * error + (memory[j, INTEGRAL] + step) + fed
-    limit = motors.limit[j]
+    step = gain * growth * error
+    asked = gain * error + (integral + step) + fed
     if abs(asked) <= limit or asked * error < 0.0:  # else the integral would wind up
-        memory[j, INTEGRAL] += step
-    return min(max(asked, -limit), limit)
+        integral += step
+    return min(max(asked, -limit), limit), integral
 
 
 @kernel
-def motor_step(motors, j, load, memory):
-    """Move the motor of joint j on by a tick under the torque of the tick before; load N m, memory (j,8)."""
-    asked, torque, speed = memory[j, ASKED], memory[j, TORQUE], memory[j, SPEED]
-    period, inertia = motors.period, motors.inertia[j]
-    mean = asked + (torque - asked) * motors.lag[j]
-    memory[j, TORQUE] = asked + (torque - asked) * motors.decay[j]
-    free = (speed + period * (mean - load) / inertia) / (1.0 + period * motors.viscous[j] / inertia)
-    slowed = abs(free) - period * motors.coulomb[j] / inertia
+def motor_step(period, push, drag, rub, lag, decay, asked, load, angle, speed, torque):
+    """Angle, speed and torque of a motor a tick later, under the torque asked for the tick before.
+
+    push: speed per torque held for a tick, rad/s per N m; drag: factor by which viscous friction slows;
+    rub rad/s: what Coulomb friction takes of the speed; lag, decay: of the current; load N m.
+    """
+    mean = asked + (torque - asked) * lag
+    free = (speed + push * (mean - load)) * drag
+    slowed = abs(free) - rub
     after = copysign(slowed, free) if slowed > 0.0 else 0.0
-    memory[j, ANGLE] += 0.5 * period * (speed + after)
-    memory[j, SPEED] = after
+    return angle + 0.5 * period * (speed + after), after, asked + (torque - asked) * decay
 
 
 @kernel
@@ -175,33 +177,76 @@ def sample_step(
     tick: number of the first of them; command rad/s and fed N m are held; load (n,ticks,joints) N m, or
     without rows, of which row k is meant; state (j,s): position, velocity and modes of the joints; transition
     (j,s,s), held (j,s): of the modes over a tick; memory: a `MotorMemory`.
+
+    What changes from tick to tick is kept in plain variables meanwhile: the arrays could be one and the same
+    for all that the compiler knows, and every step would wait for its writes.
     """
-    pitch = motors.pitch[j]
-    motor, watched, compensated = memory.motor, memory.observer, memory.compensation
+    motor, watched, compensated = memory.motor[j], memory.observer[j], memory.compensation[j]
+    angle, speed, torque = motor[ANGLE], motor[SPEED], motor[TORQUE]
+    applied, rubbed, integral = motor[ASKED], motor[FRICTION], motor[INTEGRAL]
+    read, before = motor[READ], motor[BEFORE]
+    seen, seen_speed, estimate = watched[watching.ANGLE], watched[watching.SPEED], watched[watching.LOAD]
+    once, twice, thrice = watched[watching.ONCE], watched[watching.TWICE], watched[watching.THRICE]
+    yielding, pace = compensated[compensation.ANGLE], compensated[compensation.SPEED]
+    holding, ratio = compensated[compensation.HOLDING], compensated[compensation.RATIO]
+    period, pitch, limit, believed = motors.period, motors.pitch[j], motors.limit[j], motors.believed[j]
+    lag, decay, inertia = motors.lag[j], motors.decay[j], motors.inertia[j]
+    push, drag = period / inertia, 1.0 / (1.0 + period * motors.viscous[j] / inertia)
+    rub = period * motors.coulomb[j] / inertia
+    per_period, believed_push = 1.0 / period, period / believed
+    gain = motors.proportional[j] * ratio
+    growth = motors.integral[j] * (ratio if compensate.scales_integral else 1.0)
+    correction, stiffness = observer.load[j], compensate.position_gain[j]
+    passed = 1.0 - observer.pole
     rubbing = friction.torque(friction_gains, j, memory.friction)
+    loaded = load.shape[0] > 0
     for i in range(motors.ticks):
         if i > 0:
-            measure(motors, j, tick + i, motor)
-        estimate = watched[j, watching.LOAD]
-        ratio = compensated[j, compensation.RATIO]
-        stiffening = ratio if compensate.scales_integral else 1.0
-        asked = velocity_step(
-            motors, j, command, ratio, stiffening, fed + rubbing + observer.feedforward * estimate, motor
-        )
+            before, read = read, reading(motors, j, tick + i, angle)
+        error = command - (read - before) * per_period
+        helped = fed + rubbing + observer.feedforward * estimate
+        asked, integral = velocity_step(error, gain, growth, helped, limit, integral)
         if observer.watches:
-            applied = motor[j, ASKED] - motor[j, FRICTION]
             if compensate.models:
-                compensation.displace(compensate, motors, observer, j, estimate, compensated)
+                left = (1.0 - observer.feedforward) * estimate
+                yielding, pace, holding = compensation.yielded(
+                    period, believed_push, stiffness, gain, growth, left, yielding, pace, holding
+                )
             if identify.acts:
-                identification.follow(observer, j, watched[j, watching.SPEED], memory.identification)
-            watching.step(observer, motors, j, applied, motor[j, READ], watched)
-        before = motor[j, SPEED]
-        motor_step(motors, j, load[k, i, j] if load.shape[0] > 0 else 0.0, motor)
-        motor[j, ASKED], motor[j, FRICTION] = asked, rubbing
-        acceleration = pitch * (motor[j, SPEED] - before) / motors.period
+                identification.follow(observer, j, seen_speed, memory.identification)
+            given = applied - rubbed
+            seen, seen_speed, estimate = watching.predicted(
+                observer, period, believed_push, correction, given, read, seen, seen_speed, estimate
+            )
+            once += passed * (given - once)
+            twice += passed * (once - twice)
+            thrice += passed * (twice - thrice)
+        slower = speed
+        angle, speed, torque = motor_step(
+            period,
+            push,
+            drag,
+            rub,
+            lag,
+            decay,
+            applied,
+            load[k, i, j] if loaded else 0.0,
+            angle,
+            speed,
+            torque,
+        )
+        applied, rubbed = asked, rubbing
+        acceleration = pitch * (speed - slower) * per_period
         for m in range(2, states, 2):
             d, w = state[j, m], state[j, m + 1]
             for r in range(m, m + 2):
                 free = transition[j, r, m] * d + transition[j, r, m + 1] * w
                 state[j, r] = held[j, r] * acceleration + free
-    state[j, 0], state[j, 1] = pitch * motor[j, ANGLE], pitch * motor[j, SPEED]
+    state[j, 0], state[j, 1] = pitch * angle, pitch * speed
+    motor[ANGLE], motor[SPEED], motor[TORQUE] = angle, speed, torque
+    motor[ASKED], motor[FRICTION], motor[INTEGRAL] = applied, rubbed, integral
+    motor[READ], motor[BEFORE] = read, before
+    watched[watching.ANGLE], watched[watching.SPEED], watched[watching.LOAD] = seen, seen_speed, estimate
+    watched[watching.ONCE], watched[watching.TWICE], watched[watching.THRICE] = once, twice, thrice
+    compensated[compensation.ANGLE], compensated[compensation.SPEED] = yielding, pace
+    compensated[compensation.HOLDING] = holding
