@@ -9,7 +9,7 @@ motor under the torque that was computed a tick before.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import exp, floor, pi
+from math import exp, floor, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -149,6 +149,7 @@ def run(
         if k % s.ticks == 0:
             row = k // s.ticks
             foot = nearest(y * pitch)
+            yielding = pitch * sqrt((pushed * pushed).sum())  # mm, of all axes together
             for i in range(d):
                 error = reference[row, i] / pitch - y[i]
                 command[i] = s.position_gain * error + s.velocity_share * velocity[row, i] / pitch
@@ -174,7 +175,7 @@ def run(
                         wanted = 1.0 + share * effective[i] / s.nominal
                         wanted = min(max(wanted, 1.0), s.largest)
                     elif s.law == TRIGGERED:
-                        wanted = s.largest if abs(displaced) > s.threshold else 1.0
+                        wanted = 1.0 + (s.largest - 1.0) * min(yielding / s.threshold, 1.0)
                     elif s.law == FIXED:
                         wanted = s.largest
                     else:
