@@ -46,6 +46,7 @@ TWINS = {
     "kernels/ring.py": ("naive.filtered", "test_live.py"),
     "kernels/sampling.py": ("naive.samples", "test_trajectory.py"),
     "kernels/speed_limits.py": ("naive.speed_limits", "test_feedrate.py"),
+    "kernels/structure.py": ("naive.vibration_over_position", "test_position_modes.py"),
     "kernels/sums.py": ("naive.squares", "test_sums.py"),
     "kernels/taps.py": ("naive.delayed_sum", "test_shaping.py"),
     "kernels/time_law.py": ("naive.fastest", "test_feedrate.py"),
