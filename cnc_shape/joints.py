@@ -75,7 +75,7 @@ class Joints:
         return frozen(np.hstack([rates, velocity[:, self.coupled :]]))
 
     def torques(self, pose: FloatArray, load: FloatArray) -> FloatArray:
-        """Torques on the motors of all joints (n,t,j) that hold torques over the axes (n,t,d), at poses (n,p).
+        """Torques on the motors (n,t,j) that hold torques over the axes (n,t,d), at poses (n,p).
 
         Over an axis, a torque is that of a motor whose screw is like the first joint's. Where joints are axes
         each motor holds its own; elsewhere what they do together must do the same work.

@@ -59,6 +59,8 @@ class Loading:
         now = state or self.start()
         if command.axes != self.axes:
             raise ValueError(f"{command.axes=} {self.axes=}")
+        if rows > len(command):
+            raise ValueError(f"{rows=} {len(command)=}")
         if not rows:
             return now, self._torque(now.samples, np.zeros((0, len(self.loads), len(self.axes))))
         frame, frames = now.frame.copy(), np.zeros((rows, 3, 3))

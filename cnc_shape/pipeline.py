@@ -34,6 +34,7 @@ from cnc_shape.kernels.sums import add_squares
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
+from cnc_shape.motors import DutyTally, MotorDuty, duties, servo_motors, tally_duty
 from cnc_shape.recording import Outline, Recorder, Signals
 from cnc_shape.servo import settling_time
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
@@ -87,6 +88,8 @@ class CaseSummary:
     following_rms: Mapping[str, float]  # joint: mm or rad
     residual_vibration: Mapping[str, float]  # axis: mm or rad
     turn: Turn | None = None  # where the machine turns tool or workpiece
+    motors: tuple[MotorDuty, ...] = ()  # of every joint that has a servo motor
+    disturbed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +154,8 @@ class Trial:
         self._longer = case.shaping.longer(axes, period)
         joints = joints_of(machine, kinematics)
         self._joints = joints.names
+        self._limits = np.array([motor.torque_limit for motor in servo_motors(joints).values()])
+        self._duty: DutyTally | None = None
         reach = foot_reach(settling_time(joints, case.control), self._longer, period)
         self._simulate = simulating(machine, case.control, kinematics, reach, case.disturbances)
         self._measure = measuring(reach)
@@ -176,6 +181,8 @@ class Trial:
         self._samples += len(response.command)
         add_squares(response.turn[:, None], self._turn)
         self._furthest = max(self._furthest, float(response.turn.max(initial=0.0)))
+        if response.motors is not None:
+            self._duty = tally_duty(self._duty, response.motors, self._limits)
         signals = (response.command.position, response.position, response.tool)
         self._measured, errors = self._measure(
             self._measured, block.toolpath, response.command.arc_length, signals, block.last
@@ -204,7 +211,11 @@ class Trial:
         }
         residual = dict(zip(axes, self._simulated.residual.tolist(), strict=True))
         turn = Turn(sqrt(float(self._turn[0]) / self._samples), self._furthest) if self._turns else None
-        return CaseSummary(self.case.name, self._cycle_time, command, drives, tool, following, residual, turn)
+        motors = () if self._duty is None else duties(self._duty)
+        return CaseSummary(
+            self.case.name, self._cycle_time, command, drives, tool, following, residual, turn,
+            motors, bool(self.case.disturbances),
+        )  # fmt: skip
 
 
 def run(
@@ -252,8 +263,9 @@ def run(
             axes = block.command.axes
             machine = setup.machine.with_axes(axes)
             period = setup.control.sample_time
+            motors = tuple(servo_motors(joints_of(machine, setup.kinematics)))
             recorders = [
-                Recorder(case.name, axes, period, all_signals=all_signals) if record else None
+                Recorder(case.name, axes, period, motors=motors, all_signals=all_signals) if record else None
                 for case in cases
             ]
             trials = [

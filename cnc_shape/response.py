@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cnc_shape.arrays import FloatArray
+from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.controllers.loop import SIGNALS
+from cnc_shape.joints import Joints
+from cnc_shape.machine import ServoMotor
+from cnc_shape.servo import Ticks
 from cnc_shape.trajectory import Trajectory
 
 
@@ -22,6 +26,18 @@ class MotorSignals:
     effective_inertia: FloatArray  # (n,m) kg m^2, that the compensation makes of the load
     agreement: FloatArray  # (n,m) -, -A: how much of the contour error the load's displacement explains
     inertia: FloatArray  # (n,m) kg m^2, identified; the nominal one without identification
+
+
+def motor_signals(joints: Joints, ran: Ticks) -> MotorSignals | None:
+    """What the servo motors of a machine did, if it has any."""
+    turned = [row for row, joint in enumerate(joints.drives) if isinstance(joint.drive, ServoMotor)]
+    if not turned:
+        return None
+    torque, load, estimate, ratio, effective, agreement, inertia = (
+        frozen(ran.signals[: ran.done, turned, column]) for column in range(SIGNALS)
+    )
+    names = tuple(joints.names[row] for row in turned)
+    return MotorSignals(names, torque, load, estimate, ratio, effective, agreement, inertia)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -24,7 +24,7 @@ from cnc_shape.controllers.loop import Command, Memory, MotorMemory, Poses, Term
 from cnc_shape.disturbances import EncoderNoise
 from cnc_shape.joints import Joints, joints_of
 from cnc_shape.kernels.foot_point import PathTable
-from cnc_shape.machine import FirstOrderLag, IdealDrive, Machine
+from cnc_shape.machine import IdealDrive, Machine
 from cnc_shape.plant import Plant, discretise
 
 SLOWEST_LOOP = 2.5  # s, time constant beyond which the window of foot points grows no more
@@ -167,6 +167,6 @@ def structure_of(machine: Machine, sample_time: float) -> ServoLoop:
 
 def settling_time(joints: Joints, control: Control) -> float:
     """Time constant of the position loop, s; 0 where all drives are ideal."""
-    lags = any(isinstance(drive.drive, FirstOrderLag) for drive in joints.drives)
+    lags = any(not isinstance(drive.drive, IdealDrive) for drive in joints.drives)
     slowest = min(control.joint_gains, default=control.position_gain)
     return min(1.0 / slowest, SLOWEST_LOOP) if lags else 0.0

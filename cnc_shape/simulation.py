@@ -12,14 +12,15 @@ the joints make of the axes::
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.commanding import resting, tell
 from cnc_shape.controllers import Control, Estimator
-from cnc_shape.controllers.loop import SIGNALS, Command, Memory, Poses
+from cnc_shape.controllers.loop import SIGNALS, Command, Poses
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
@@ -32,46 +33,16 @@ from cnc_shape.refusals import (
     refuse_divergence,
     refuse_pose,
 )
-from cnc_shape.response import MotorSignals, Response
+from cnc_shape.response import Response, motor_signals
 from cnc_shape.segments import path_table
-from cnc_shape.servo import (
-    NO_POSES,
-    UNLOADED,
-    PathWindows,
-    Ticks,
-    copied,
-    make_loop,
-    settling_time,
-    structure_of,
-)
+from cnc_shape.servo import NO_POSES, UNLOADED, PathWindows, Ticks, make_loop, settling_time, structure_of
+from cnc_shape.simulation_state import SimulationState, copied_state
 from cnc_shape.toolpath import Toolpath
 from cnc_shape.trajectory import Trajectory, join_trajectories
-from cnc_shape.windows import Reach, Windows, WindowState, foot_reach, windowing
+from cnc_shape.windows import Reach, Windows, foot_reach, windowing
 
 RESIDUAL_PERIODS = 10.0  # of the slowest mode, watched after the end
 SHORTEST_RESIDUAL_TIME = 0.5  # s
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class SimulationState:
-    """Where the loop stands between two chunks."""
-
-    loop: Memory
-    structure: Memory | None  # of the axes behind the joints; None where these are the axes
-    begun: bool  # loop and structure rest where the command begins, or have gone on from there
-    held: Trajectory  # samples that wait for the one after them, or for their windows
-    ticks: int  # run so far
-    before: FloatArray  # (1,j) mm or rad, what the drives were told last; (0,) before the first
-    inverse: FloatArray  # (1,c,c) inverse Jacobian in use, (0,c,c) before the first
-    windows: WindowState | None
-    load: LoadState | None  # None before the first sample
-    source: str  # of the toolpath
-    settling: FloatArray  # (m,d) mm or rad, tool minus drive at and after the end; (0,d) before
-
-    @property
-    def residual(self) -> FloatArray:
-        """Largest |tool - drive| of every axis once the command has come to rest, (d,) mm or rad."""
-        return np.abs(self.settling).max(axis=0, initial=0.0)
 
 
 SimulationStep = Callable[
@@ -181,7 +152,7 @@ class _Stage:
     def step(
         self, state: SimulationState | None, toolpath: Toolpath | None, command: Trajectory, last: bool
     ) -> tuple[SimulationState, Response]:
-        now = self._start(command) if state is None else _copy(state)
+        now = self._start(command) if state is None else copied_state(state)
         if not now.begun and len(command):
             now = self._begin(now, command)
         source = now.source if toolpath is None else toolpath.source
@@ -195,7 +166,7 @@ class _Stage:
         now = replace(now, held=command.cut(slice(ticks, None)), windows=places, source=source)
         if ticks == 0:
             return now, self._nothing(command.cut(slice(0, 0)))
-        pose, told = self._told(now, command, ticks)
+        pose, told = tell(self._joints, self._loop.plant.ideal, command, now.before, ticks)
         lines = partial(line_in_windows, windows, command.arc_length)
         if windows is not None:
             refuse_pose(self._joints, pose, lines, source)
@@ -209,7 +180,7 @@ class _Stage:
         position, tool, turn = self._axes(now, pose, ran)
         response = Response(
             command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,
-            ran.drive, turn, self._signals(ran),
+            ran.drive, turn, motor_signals(self._joints, ran),
         )  # fmt: skip
         now = replace(
             now, ticks=now.ticks + ticks, before=told.reference[ticks - 1 : ticks], inverse=inverse, load=load
@@ -246,36 +217,9 @@ class _Stage:
 
     def _nothing(self, command: Trajectory) -> Response:
         none = frozen(np.zeros((0, len(self._joints.drives))))
-        idle = Ticks(none, none, none, none, frozen(np.zeros((0, len(self._joints.drives), SIGNALS))), 0)
-        return Response(
-            command, none, none, command.position, command.position, none, frozen([]), self._signals(idle)
-        )
-
-    def _told(self, now: SimulationState, command: Trajectory, ticks: int) -> tuple[FloatArray, Command]:
-        """Poses and what the loop is told, one sample more than ticks: after the last, rest.
-
-        Feedforward takes the acceleration of the coming sample from the change of velocity. A replayed
-        command's is a central difference, which spreads every change of acceleration over two samples: drives
-        are told that of the step which arrives, and its change is the second difference of their positions.
-        """
-        rows = min(ticks + 1, len(command))
-        position, velocity, acceleration = (
-            values[:rows] for values in (command.position, command.velocity, command.acceleration)
-        )
-        if rows == ticks:
-            position = np.vstack([position, position[-1:]])
-            velocity, acceleration = (
-                np.vstack([values, np.zeros_like(position[-1:])]) for values in (velocity, acceleration)
-            )
-        pose = self._joints.pose(frozen(position))
-        rates = self._joints.rates(pose, self._joints.pose(frozen(velocity)))
-        reference = self._joints.inverse(pose)
-        if command.replayed:
-            steps = np.diff(reference, axis=0, prepend=now.before) / self._period
-            rates = np.where(self._loop.plant.ideal, rates, steps)
-        return pose, Command(
-            frozen(position), frozen(velocity), frozen(acceleration), frozen(reference), frozen(rates)
-        )
+        idle = Ticks(none, none, none, none, frozen(np.zeros((*none.shape, SIGNALS))), 0)
+        motors = motor_signals(self._joints, idle)
+        return Response(command, none, none, command.position, command.position, none, frozen([]), motors)
 
     def _poses(self, now: SimulationState, pose: FloatArray, ticks: int) -> tuple[Poses, FloatArray]:
         """Inverse Jacobians for some ticks, and the one in use at their end."""
@@ -306,14 +250,6 @@ class _Stage:
         load, torque = self._loading(now.load, command, ticks)
         return load, self._joints.torques(pose[:ticks], torque)
 
-    def _signals(self, ran: Ticks) -> MotorSignals | None:
-        """What the servo motors did, if there are any."""
-        if not self._servo:
-            return None
-        turned = np.flatnonzero(self._loop.motors.servo)
-        columns = (frozen(ran.signals[: ran.done, turned, column]) for column in range(SIGNALS))
-        return MotorSignals(tuple(self._joints.names[joint] for joint in turned), *columns)
-
     def _axes(
         self, now: SimulationState, pose: FloatArray, ran: Ticks
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -339,10 +275,7 @@ class _Stage:
     ) -> FloatArray:
         """Tool minus drives from the end on, the command at rest."""
         n = self._watched
-        position = np.repeat(told.position[-1:], n + 1, axis=0)
-        reference = np.repeat(told.reference[-1:], n + 1, axis=0)
-        still, quiet = np.zeros_like(position), np.zeros_like(reference)
-        rest = Command(frozen(position), frozen(still), frozen(still), frozen(reference), frozen(quiet))
+        rest = resting(told, n)
         last = Poses(frozen(poses.inverse[-1:]), 0, n + 1) if len(poses.inverse) else NO_POSES
         pose, path = self._joints.pose(rest.position), self._path(windows)
         around = PathWindows(
@@ -354,12 +287,6 @@ class _Stage:
         ran = self._loop.run(now.loop, rest, last, around, load)
         position, tool, _ = self._axes(now, pose, ran)
         return frozen(np.vstack([ending, tool - position]))
-
-
-def _copy(state: SimulationState) -> SimulationState:
-    return replace(
-        state, loop=copied(state.loop), structure=None if state.structure is None else copied(state.structure)
-    )
 
 
 def _residual_ticks(machine: Machine, control: Control) -> int:

@@ -15,16 +15,19 @@ from pathlib import Path
 import numpy as np
 
 from cnc_shape.applying import Application
-from cnc_shape.arrays import FloatArray, IntArray
+from cnc_shape.arrays import FloatArray, IntArray, frozen
 from cnc_shape.cases import default_cases, timings
 from cnc_shape.census import count
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Setup
+from cnc_shape.disturbances import Disturbances, LoadTorque, PathDirection, Steps
 from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.kernels import compiled_count
+from cnc_shape.kernels.noise import normal
 from cnc_shape.kinematics import cubic_parallel, cubic_rails, first_refusal, linear_delta, trunnion_ac
 from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
+from cnc_shape.loading import loading
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import run
 from cnc_shape.readers import ReadingOptions, read_program, reading
@@ -35,10 +38,15 @@ from cnc_shape.shapers.live import LiveShaper, filters
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.trade import Trade
+from cnc_shape.trajectory import Trajectory
 from cnc_shape.writers.points import points_file, points_of
 from cnc_shape.writers.program import write_program
 
-MACHINES = ("xy_stage.yaml", "mill_three_axis.yaml")  # ideal and lagging drives, with modes and without
+MACHINES = (  # ideal and lagging drives and motors, with modes and without, under loads and not
+    "xy_stage.yaml",
+    "mill_three_axis.yaml",
+    "servo_three_axis.yaml",
+)
 SMALL_CHUNK = 4  # rows, so that every stage is entered with a state
 LINES = """G21 G90 G64 P0.02
 G1 X10 F3000
@@ -89,6 +97,7 @@ def warm() -> Iterator[int]:
         _thin(Path(folder) / "long.nc", machines[0])
         _stream(machines[0])
         _hold()
+        _disturb()
         yield compiled_count()
 
 
@@ -144,6 +153,15 @@ def _hold() -> None:
         machine.forward(machine.inverse(poses), poses)
         if machine.turn is not None:
             machine.turn(poses, poses)
+
+
+def _disturb() -> None:
+    """Load a path, and read an encoder in noise."""
+    still = frozen(np.zeros((1, 3)))
+    command = Trajectory(("x", "y", "z"), 1.0, frozen([0.0]), still, still, still)
+    load = LoadTorque(PathDirection.NORMAL, 1.0, Steps((0.0,), (1.0,)))
+    loading(Disturbances((load,)), command.axes, command.sample_time, 1)(None, command, 1)
+    normal(0, 0, 0)
 
 
 def _certify(path: Path, setup: Setup) -> None:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import lfilter
 
 from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.modes import Mode
+from cnc_shape.motors import duties, tally_duty
 from cnc_shape.pipeline import CaseSummary, Deviation, Run, Summary
 from cnc_shape.recording import Signals
+from cnc_shape.response import MotorSignals
 from cnc_shape.shapers import Shaper
 
 PROGRAM = "corner_and_arc.nc"
@@ -106,4 +110,47 @@ def _case(
     return signals, CaseSummary(
         name, cycle_time, deviation(ce, cl), deviation(de, dl), deviation(te, tl),
         dict(zip(axes, following.tolist(), strict=True)), dict(zip(axes, rest.tolist(), strict=True)),
+    )  # fmt: skip
+
+
+JOINTS = ("x", "y")  # those of `driven` that have a servo motor
+TORQUE_LIMIT = 2.2  # N m
+INERTIA = 4.6e-4  # kg m^2
+
+
+def driven(samples: int = 4000) -> Run:
+    """A machine with servo motors, every case followed by itself under a load torque."""
+    plain = make_run(samples)
+    names = ("independent", "disturbance_observer", "disturbance_observer+inertia_compensation")
+    kept, rows = [], []
+    for name, signals, row in zip(names, plain.signals, plain.summary.cases, strict=True):
+        for disturbed in (False, True):
+            case = name + "+disturbed" * disturbed
+            motors = motor_signals(signals.time, name, 2.5 if disturbed else 0.0)
+            duty = duties(tally_duty(None, motors, np.full(len(JOINTS), TORQUE_LIMIT)))
+            grown = {"independent": 4.0, "disturbance_observer": 1.1}.get(name, 1.5) if disturbed else 1.0
+            tool = replace(row.tool, rms=grown * row.tool.rms, max=grown * row.tool.max)
+            rows.append(replace(row, name=case, tool=tool, motors=duty, disturbed=disturbed))
+            kept.append(replace(signals, case=case, motors=motors))
+    return replace(plain, signals=tuple(kept), summary=replace(plain.summary, cases=tuple(rows)))
+
+
+def motor_signals(time: np.ndarray, case: str, peak: float) -> MotorSignals:
+    """A load that turns round as it swells and ebbs, an observer that lags, a gain that follows."""
+    end = time[-1]
+    swelling = peak * np.sin(np.pi * time / end) ** 2
+    load = np.column_stack(
+        [swelling * np.cos(8.0 * np.pi * time / end), swelling * np.sin(8.0 * np.pi * time / end)]
+    )
+    friction = 0.08 * np.sign(np.sin(12.0 * np.pi * time / end))[:, None]
+    torque = np.clip(load + friction, -TORQUE_LIMIT, TORQUE_LIMIT)
+    sees, adapts = case != "independent", "inertia" in case
+    pole = np.exp(-(time[1] - time[0]) / 0.01)
+    seen = lfilter([1.0 - pole], [1.0, -pole], load + friction, axis=0) * sees
+    felt = np.maximum(np.abs(seen) - 0.12, 0.0) / 265.0 * adapts
+    gain = np.clip(1.0 + felt / INERTIA, 1.0, 2.5)
+    still = np.ones_like(load)
+    return MotorSignals(
+        JOINTS, frozen(torque), frozen(load), frozen(seen), frozen(gain), frozen(felt), frozen(still),
+        frozen(INERTIA * still),
     )  # fmt: skip

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from runs import MODE, make_run, shaper
+from runs import INERTIA, MODE, driven, make_run, shaper
 
 from cnc_shape.arrays import frozen
 from cnc_shape.report import figures
+from cnc_shape.report.motor_figures import motor_cases, motor_figure
 from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.style import render
 
@@ -45,6 +46,67 @@ def test_every_axis_carries_its_unit(name):
         for label in (ax.get_xlabel(), ax.get_ylabel()):
             assert label == "" or re.search(r"\((mm|s|µm|mm/s|mm/s²)\)$", label)
     assert any(ax.get_xlabel() for ax in DRAW[name](RUN).axes)
+
+
+DRIVEN = driven(2000)
+
+
+def test_disturbed_cases_have_their_motors_drawn_or_else_the_last():
+    assert [signals.case for signals in motor_cases(DRIVEN)] == [
+        "independent+disturbed", "disturbance_observer+disturbed",
+        "disturbance_observer+inertia_compensation+disturbed",
+    ]  # fmt: skip
+    assert motor_cases(RUN) == []
+    rows = tuple(replace(case, disturbed=False) for case in DRIVEN.summary.cases)
+    calm = replace(DRIVEN, summary=replace(DRIVEN.summary, cases=rows))
+    assert motor_cases(calm) == [DRIVEN.signals[-1]]
+    with pytest.raises(ValueError, match="no servo motors"):
+        motor_figure(RUN.signals[0])
+
+
+def test_load_torque_and_estimate_of_every_motor_are_drawn_with_their_extremes():
+    for signals, panels in zip(motor_cases(DRIVEN), (2, 2, 4), strict=True):
+        figure, motors = motor_figure(signals), signals.motors
+        assert len(figure.axes) == panels
+        for k, ax in enumerate(figure.axes[:2]):
+            drawn = [motors.load, motors.torque, *([motors.estimate] if motors.estimate.any() else [])]
+            assert len(ax.lines) == len(drawn)
+            for line, values in zip(ax.lines, drawn, strict=True):
+                assert np.max(line.get_ydata()) == values[:, k].max()
+                assert np.min(line.get_ydata()) == values[:, k].min()
+        for ax, values in zip(figure.axes[2:], (motors.gain_ratio, motors.effective_inertia), strict=False):
+            assert [np.max(line.get_ydata()) for line in ax.lines] == values.max(axis=0).tolist()
+        for ax in figure.axes:
+            assert re.search(r"\((N m|-|kg m²)\)$", ax.get_ylabel())
+        assert figure.axes[-1].get_xlabel() == "time (s)"
+        assert render(figure, "svg") == render(motor_figure(signals), "svg")
+
+
+def test_an_inertia_that_is_identified_has_a_panel():
+    signals = DRIVEN.signals[-1]
+    learnt = INERTIA * np.linspace(1.0, 2.0, signals.time.size)[:, None] * [1.0, 0.9]
+    figure = motor_figure(replace(signals, motors=replace(signals.motors, inertia=frozen(learnt))))
+    assert figure.axes[-1].get_title(loc="left") == "Identified inertia"
+    assert [line.get_ydata()[-1] for line in figure.axes[-1].lines] == learnt[-1].tolist()
+
+
+def test_a_disturbed_case_has_the_colour_of_its_undisturbed_dotted_self():
+    lines = figures.error_figure(DRIVEN).axes[0].lines
+    for calm, disturbed in zip(lines[::2], lines[1::2], strict=True):
+        assert calm.get_color() == disturbed.get_color()
+        assert (calm.get_linestyle(), disturbed.get_linestyle()) == ("--", "-")
+    assert len({line.get_color() for line in lines}) == 3
+
+
+@pytest.mark.parametrize("draw", [figures.error_figure, figures.motion_figure, figures.vibration_figure])
+def test_no_legend_is_cut_however_long_the_names(draw):
+    figure = draw(DRIVEN)
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
+    assert box.y0 >= figure.bbox.y0
+    assert all(box.y1 <= ax.get_tightbbox().y0 for ax in figure.axes)
 
 
 def test_svg_holds_no_font_and_no_reference_outside():

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from runs import MODE, PROGRAM, TEXT, make_run, shaper
+from runs import MODE, PROGRAM, TEXT, driven, make_run, shaper
 
 from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.contour import ContourError
 from cnc_shape.errors import InfeasibleError, OutputError
-from cnc_shape.recording import Recorder
+from cnc_shape.recording import MOTORS, Recorder
 from cnc_shape.report.folder import RUNS, Context, default_folder, write_report
 from cnc_shape.report.table import summary_json
 from cnc_shape.response import Response
@@ -88,6 +88,42 @@ def test_signals_hold_every_sample_time_first_with_units(written):
             assert_array_equal(signals[f"{case.case}/tool_contour_error_mm"], case.tool_error)
             assert_array_equal(signals[f"{case.case}/line"], case.line)
             assert_array_equal(signals[f"{case.case}/settling_x_mm"], case.settling[:, 0])
+
+
+def test_motors_have_their_signals_figures_and_numbers(tmp_path, quick):
+    run = driven(600)
+    write_report(run, tmp_path / "run", CONTEXT)
+    drawn = {path.name for path in (tmp_path / "run" / "figures").glob("motors_*")}
+    assert drawn == {
+        f"motors_{signals.case}.svg" for signals in run.signals if signals.case.endswith("+disturbed")
+    }
+    results = json.loads((tmp_path / "run" / "results.json").read_bytes())["cases"]
+    with np.load(tmp_path / "run" / "signals.npz") as signals:
+        for case, row in zip(run.signals, results, strict=True):
+            for k, motor in enumerate(row["motors"]):
+                stem, joint = case.case, motor["joint"]
+                for name, unit in (
+                    ("torque", "_nm"), ("load", "_nm"), ("estimate", "_nm"), ("gain_ratio", ""),
+                    ("effective_inertia", "_kg_m2"), ("agreement", ""), ("inertia", "_kg_m2"),
+                ):  # fmt: skip
+                    values = signals[f"{stem}/{name}_{joint}{unit}"]
+                    assert_array_equal(values, getattr(case.motors, name)[:, k])
+                torque = np.abs(signals[f"{stem}/torque_{joint}_nm"])
+                assert motor["peak_torque_nm"] == torque.max()
+                assert motor["saturated_share"] == np.mean(torque >= 2.2)
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_a_motor_signal_that_is_not_finite_is_named_with_its_time(tmp_path, name):
+    run = driven(600)
+    values = getattr(run.signals[1].motors, name).copy()
+    values[60, 1] = np.inf
+    bad = replace(run.signals[1], motors=replace(run.signals[1].motors, **{name: frozen(values)}))
+    with pytest.raises(
+        InfeasibleError, match=rf"{name} of Y of the case independent\+disturbed is inf at t = "
+    ):
+        write_report(replace(run, signals=(run.signals[0], bad, *run.signals[2:])), tmp_path / "run", CONTEXT)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_run_json_names_inputs_versions_and_command(written):

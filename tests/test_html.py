@@ -14,10 +14,11 @@ from pathlib import Path
 
 import pytest
 from payloads import PAYLOADS
-from runs import MODE, TEXT, make_run, shaper
+from runs import MODE, TEXT, driven, make_run, shaper
 
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.motor_figures import motor_cases, motor_figure
 from cnc_shape.report.style import render
 from cnc_shape.report.table import columns
 from cnc_shape.report.words import verdict
@@ -75,6 +76,37 @@ def test_the_page_says_the_verdict_and_every_number_of_the_table(plain):
     assert "rounds corners" in text
     assert "part.nc:3: warning: odd" in text
     assert read.tags.count("img") == 1
+
+
+DRIVEN = driven(600)
+
+
+def driven_page(**changes) -> str:
+    drawn = {signals.case: render(motor_figure(signals), "svg") for signals in motor_cases(DRIVEN)}
+    return render_html(DRIVEN, Page(motor_figures=drawn, **changes))
+
+
+def test_servo_motors_have_a_table_and_a_figure_for_every_disturbed_case(plain):
+    page = driven_page()
+    read, text = Reader(page), " ".join(Reader(page).text.split())
+    assert verdict(DRIVEN.summary) in text
+    assert read.tags.count("img") == 3
+    assert set(read.tags) <= TAGS
+    for case in DRIVEN.summary.cases:
+        for motor in case.motors:
+            assert f"{motor.peak_torque:.3g}" in text
+            assert f"{100.0 * motor.saturated_share:.3g}" in text
+    assert "of disturbed rows, against the first of them" in text
+    assert text.count("+ disturbed") >= 3
+    assert "Servo motors" not in Reader(plain).text
+    assert "of them" not in Reader(plain).text
+    assert driven_page() == page
+
+
+def test_a_page_of_many_samples_keeps_its_size():
+    run = driven(200_000)
+    drawn = {signals.case: render(motor_figure(signals), "svg") for signals in motor_cases(run)}
+    assert len(render_html(run, Page(motor_figures=drawn))) < 1_500_000
 
 
 def test_the_policy_admits_the_style_sheet_by_its_hash_and_nothing_else(plain):
@@ -165,6 +197,14 @@ def test_a_browser_shows_the_page_without_a_complaint(browser, tmp_path, plain):
     document, console = visit(browser, page, tmp_path / "profile")
     assert console == ""
     assert "<h1>corner_and_arc.nc</h1>" in document
+
+
+def test_a_browser_shows_servo_motors_without_a_complaint(browser, tmp_path):
+    page = tmp_path / "report.html"
+    page.write_text(driven_page(), encoding="utf-8")
+    document, console = visit(browser, page, tmp_path / "profile")
+    assert console == ""
+    assert document.count("<figure>") == 3
 
 
 def test_no_payload_runs_in_a_browser(browser, tmp_path):

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motions import MILL, streamed, wander
 from numpy.testing import assert_allclose, assert_array_equal
+from paths import arc, line, toolpath
 
 from cnc_shape.arrays import frozen
 from cnc_shape.disturbances import (
@@ -21,6 +22,7 @@ from cnc_shape.disturbances import (
 )
 from cnc_shape.kernels.frames import FRAME_SIZE, path_frames
 from cnc_shape.loading import STILL, STILL_REPLAYED, WINDOW, loading
+from cnc_shape.program import PathMode
 from cnc_shape.trajectory import Trajectory
 
 NORMAL, TANGENT, BINORMAL = PathDirection.NORMAL, PathDirection.TANGENT, PathDirection.BINORMAL
@@ -199,6 +201,17 @@ def test_rounding_near_rest_is_no_curve(shares):
     )
 
 
+def test_on_a_planned_circle_the_normal_is_outward():
+    # the planner's curves stand in for the arc within its tolerance, and bend as it does
+    stop = PathMode.EXACT_STOP
+    moves = line(50, 0, 0, mode=stop), arc((50, 0, 0), (0, 0, 0), 2.0 * np.pi, mode=stop)
+    columns, _ = streamed([toolpath(*moves)], MILL)
+    whole = command(*[columns[f"Trajectory.{name}"] for name in ("position", "velocity", "acceleration")])
+    place = columns["Trajectory.arc_length"]
+    round_ = (place > 50.1) & (place < 50.0 + 100.0 * np.pi - 0.1)
+    assert_allclose(directions(NORMAL, whole)[round_], whole.position[round_] / 50.0, atol=3e-3)
+
+
 def test_every_direction_has_unit_length():
     columns, _ = streamed([wander(np.random.default_rng(5), 400)], MILL)
     whole = command(*[columns[f"Trajectory.{name}"] for name in ("position", "velocity", "acceleration")])
@@ -298,9 +311,11 @@ def test_a_plane_command_has_its_normal_in_the_plane():
     assert not directions(BINORMAL, flat).any()  # across the plane nothing can move
 
 
-def test_a_command_of_other_axes_is_refused():
+def test_a_command_of_other_axes_or_too_few_samples_is_refused():
     with pytest.raises(ValueError, match="axes"):
         steady("x", ("x", "y"))(None, circle(3), 3)
+    with pytest.raises(ValueError, match="rows"):
+        steady("x")(None, circle(3), 4)
 
 
 # --- chunks -------------------------------------------------------------------------------------------

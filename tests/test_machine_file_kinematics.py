@@ -250,7 +250,7 @@ def test_joints_without_a_drive_are_ideal() -> None:
         ("{type: corexy}", "joints: []\n", (3, 9), "joints: corexy has 3 of them, not 0", "q1, q2, q3"),
         (CUBE, drives(7), (3, 9), "joints: cubic_parallel has 6 of them, not 7", "q1, q2, q3, q4, q5, q6"),
         ("{type: trunnion_ac, pivot_mm: [0, 0, 0]}", drives(3), (3, 9), "trunnion_ac has 5", "for x, y, z, a, c,"),
-        ("{type: corexy}", "joints: [{drive: {type: servo_motor}}, {}, {}]\n", (3, 25), "joints[0].drive.type: servo_motor is not built", "ideal"),
+        ("{type: corexy}", "joints: [{drive: {type: servo_motor}}, {}, {}]\n", (3, 18), "joints[0].drive: inertia_kg_m2 is missing", "add"),
         ("{type: corexy}", "joints: [{dirve: {}}, {}, {}]\n", (3, 11), "joints[0].dirve: unknown key", "did you mean drive?"),
         ("{type: corexy}", "joints: {q1: {}}\n", (3, 9), "joints: must be a list", ""),
     ],

@@ -46,6 +46,34 @@ def test_the_normal_value_is_that_of_the_slow_twin(seed, joint, tick):
     assert_allclose(normal(seed, joint, tick), naive.normal_noise(seed, joint, tick), rtol=1e-15, atol=1e-15)
 
 
+def unmixed(word):
+    """What SplitMix64's finaliser makes `word` of: its steps undone, last first."""
+
+    def unshifted(z, by):
+        whole = z
+        for _ in range(64 // by):
+            whole = z ^ (whole >> by)
+        return whole
+
+    word = unshifted(word, 31) * pow(0x94D049BB133111EB, -1, 2**64) % 2**64
+    word = unshifted(word, 27) * pow(0xBF58476D1CE4E5B9, -1, 2**64) % 2**64
+    return unshifted(word, 30)
+
+
+def test_the_rarest_word_has_a_finite_value_too():
+    # only 0 is mixed to 0: a seed whose counter comes there at an even count, the radius of a tick
+    joint, golden = 2, 0x9E3779B97F4A7C15
+    for seed in range(20):
+        stream = unmixed(int(word_at(seed, joint, -1)))  # a count of -1 adds nothing to it
+        count = (-stream * pow(golden, -1, 2**64) - 1) % 2**64
+        if count % 2 == 0:
+            break
+    assert int(word_at(seed, joint, np.uint64(count))) == 0
+    turn = naive.random_word(seed, joint, count + 1) / 2**64
+    largest = np.sqrt(-2.0 * np.log(2.0**-54))
+    assert_allclose(normal(seed, joint, count // 2), largest * np.cos(2 * np.pi * turn), rtol=1e-12)
+
+
 def test_no_value_depends_on_those_before_it(noise):
     np.testing.assert_array_equal(
         np.concatenate([drawn(7, 0, 0, 1234), drawn(7, 0, 1234, 500)]), noise[:1734]

@@ -16,15 +16,17 @@ from cnc_shape.cases import default_cases, pick_cases, timings
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Planning, Shaping
+from cnc_shape.controllers.compensation import DisturbanceObserver, InertiaCompensation
+from cnc_shape.disturbances import UNDISTURBED, Disturbances, LoadTorque, PathDirection, SineBurst
 from cnc_shape.errors import InfeasibleError, OptionError
 from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, Machine
+from cnc_shape.machine import Axis, Machine, ServoMotor
 from cnc_shape.motion import moving, replaying
 from cnc_shape.opening import open_motion
-from cnc_shape.pipeline import run
+from cnc_shape.pipeline import Case, run
 from cnc_shape.readers import ReadingOptions, read_program, read_trajectory
-from cnc_shape.recording import Signals
+from cnc_shape.recording import MOTORS, Signals
 from cnc_shape.report.table import summary_json
 from cnc_shape.shapers.contour_compensation import half_width
 from cnc_shape.smoothing import Smoothing, smooth
@@ -74,8 +76,10 @@ def same(first, second) -> None:
     """Equal to the last bit: scalars and every recorded sample."""
     assert first.summary == second.summary
     for mine, theirs in zip(first.signals, second.signals, strict=True):
-        for name in Signals.__slots__:
+        for name in set(Signals.__slots__) - {"motors"}:
             assert_array_equal(getattr(mine, name), getattr(theirs, name))
+        for name in MOTORS if mine.motors is not None else ():
+            assert_array_equal(getattr(mine.motors, name), getattr(theirs.motors, name))
     assert_array_equal(first.path, second.path)
 
 
@@ -110,6 +114,57 @@ def test_tiny_segments_with_corners_on_the_borders_of_chunks(size):
         return run(blocks, setup, cases, "tiny", record=True)
 
     same(through(cut(whole, size)), through([whole]))
+
+
+def servo_cases(setup, torque_limit: float = 7.1):
+    """A machine with two servo motors, alone and with all its terms, each undisturbed and under a load."""
+    motor = ServoMotor(4.6e-4, torque_limit, 10.0, viscous=5e-4, coulomb=0.08, encoder_counts=10_000)
+    axes = [
+        replace(axis, drive=motor, modes=()) if axis.name in "xy" else axis for axis in setup.machine.axes
+    ]
+    setup = replace(setup, machine=replace(setup.machine, axes=tuple(axes)))
+    alone = replace(setup.control, cross_coupling=None)
+    helped = replace(
+        alone, disturbance_observer=DisturbanceObserver(), inertia_compensation=InertiaCompensation()
+    )
+    load = Disturbances((LoadTorque(PathDirection.NORMAL, 2.5, SineBurst(4.0, 1.0, 0.3)),))
+    shaping = setup.command_shaping(Shaping.NONE)
+    return setup, [
+        Case(name + "+disturbed" * bool(acts), shaping, control, disturbances=acts)
+        for name, control in (("independent", alone), ("disturbance_observer+inertia_compensation", helped))
+        for acts in (UNDISTURBED, load)
+    ]
+
+
+@pytest.mark.parametrize("size", [1, 500, 777])
+def test_what_servo_motors_do_does_not_depend_on_chunks(size):
+    setup, cases = servo_cases(load_machine(bundled("xy_stage.yaml")))
+    whole = tiny_segments()
+
+    def through(chunks):
+        blocks = moving(chunks, setup.machine, 0.01, 1e-3, timings(cases))
+        return run(blocks, setup, cases, "tiny", record=True)
+
+    found = through([whole])
+    same(through(cut(whole, size)), found)
+    assert [case.disturbed for case in found.summary.cases] == [False, True, False, True]
+    for case, signals in zip(found.summary.cases, found.signals, strict=True):
+        motors = signals.motors
+        assert motors.joints == tuple(motor.joint for motor in case.motors) == ("x", "y")
+        for k, motor in enumerate(case.motors):
+            assert motor.peak_torque == np.abs(motors.torque[:, k]).max()
+            assert motor.peak_load == np.abs(motors.load[:, k]).max()
+            assert motor.peak_gain_ratio == motors.gain_ratio[:, k].max()
+            assert motor.saturated_share == np.mean(np.abs(motors.torque[:, k]) >= 7.1)
+            assert (motor.peak_load > 1.0) == case.disturbed
+    assert found.summary.cases[3].motors[0].peak_gain_ratio > 2.0
+
+
+def test_a_weak_motor_is_at_its_limit_for_a_share_of_the_time():
+    setup, cases = servo_cases(load_machine(bundled("xy_stage.yaml")), torque_limit=0.3)
+    blocks = moving([tiny_segments()], setup.machine, 0.01, 1e-3, timings(cases))
+    motors = run(blocks, setup, cases[1:2], "tiny").summary.cases[0].motors
+    assert all(motor.peak_torque == 0.3 and 0.01 < motor.saturated_share < 1.0 for motor in motors)
 
 
 @pytest.mark.parametrize("sample", SAMPLES)

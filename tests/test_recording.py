@@ -16,15 +16,16 @@ from cnc_shape.arrays import frozen, frozen_integers
 from cnc_shape.contour import ContourError
 from cnc_shape.errors import InfeasibleError, OutputError
 from cnc_shape.kernels.extremes import sample_measures
-from cnc_shape.recording import PICKS, Outline, Recorder, Signals
+from cnc_shape.recording import MOTORS, PICKS, Outline, Recorder, Signals, picks
 from cnc_shape.recording.extremes import Extremes
-from cnc_shape.response import Response
+from cnc_shape.response import MotorSignals, Response
 from cnc_shape.trajectory import Trajectory
 from cnc_shape.writers import spool
 
 SAMPLE_TIME = 1e-3
 AXES = ("x", "y", "z", "a")
 COUNT = 12_345
+JOINTS = ("x", "z")  # those that have a servo motor
 BUCKETS = 32  # so that 256 samples are kept as they are
 SETTLING = np.ones((3, 4))
 
@@ -32,16 +33,19 @@ SETTLING = np.ones((3, 4))
 class Motion:
     """Signals that are rough, rounded so that equals occur, and all unlike."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, joints: tuple[str, ...] = ()) -> None:
         draw = np.random.default_rng(count)
         self.motions = [np.round(draw.normal(size=(count, 4)), 2) for _ in range(5)]
         self.errors = [np.round(draw.uniform(size=count), 2) for _ in range(3)]
         self.foot = draw.normal(size=(count, 3))
         self.line = np.arange(count) // 3
+        self.joints = joints
+        self.motors = {name: np.round(draw.normal(size=(count, len(joints))), 2) for name in MOTORS}
 
-    def record(self, chunk: int, wait: int = 0, **limits) -> Signals:
+    def record(self, chunk: int, wait: int = 0, announced=None, **limits) -> Signals:
         """Feed a recorder chunk by chunk, the errors `wait` samples late."""
-        recorder = Recorder("shaped", AXES, SAMPLE_TIME, buckets=BUCKETS, **limits)
+        motors = self.joints if announced is None else announced
+        recorder = Recorder("shaped", AXES, SAMPLE_TIME, motors=motors, buckets=BUCKETS, **limits)
         count, decided = self.line.size, 0
         for low in range(0, count, chunk):
             high = min(low + chunk, count)
@@ -56,19 +60,27 @@ class Motion:
                 )
                 for e in self.errors
             ]  # fmt: skip
+            told = {name: frozen(values[low:high]) for name, values in self.motors.items()}
+            motors = MotorSignals(self.joints, **told) if self.joints else None
             recorder.add(
-                Response(trajectory, position, position, position, tool, position, position[:0, 0]), errors
+                Response(trajectory, position, position, position, tool, position, position[:0, 0], motors),
+                errors,
             )
         return recorder.signals(SETTLING)
 
 
 MOTION = Motion(COUNT)
+DRIVEN = Motion(COUNT, JOINTS)
 
 
 def same(first: Signals, second: Signals) -> None:
     for name in Signals.__slots__:
-        if name != "samples":
+        if name not in ("samples", "motors"):
             assert_array_equal(getattr(first, name), getattr(second, name))
+    assert (first.motors is None) == (second.motors is None)
+    if first.motors is not None and second.motors is not None:
+        for name in ("joints", *MOTORS):
+            assert_array_equal(getattr(first.motors, name), getattr(second.motors, name))
     assert (first.samples is None) == (second.samples is None)
     for name in ("time", "tool", "tool_error", "line"):
         if first.samples is not None and second.samples is not None:
@@ -128,6 +140,64 @@ def test_every_sample_is_there_for_the_archive(limits, monkeypatch):
     assert_array_equal(signals.samples.read("acceleration", 3), MOTION.motions[4][:, 3])
     assert_array_equal(signals.samples.read("drive_error"), MOTION.errors[1])
     assert_array_equal(signals.samples.read("line"), MOTION.line)
+
+
+# --- servo motors ---------------------------------------------------------------------------------
+
+
+def test_what_the_motors_of_a_short_motion_did_is_kept_whole():
+    motion = Motion(150, JOINTS)
+    signals = motion.record(64, 10)
+    assert (signals.factor, signals.motors.joints) == (1, JOINTS)
+    for name in MOTORS:
+        assert_array_equal(getattr(signals.motors, name), motion.motors[name])
+        assert_array_equal(*signals.pieces(name, 1), motion.motors[name][:, 1])
+    assert Motion(150).record(64, 10).motors is None
+
+
+@pytest.mark.parametrize(("chunk", "wait"), [(1, 5), (257, 300), (4096, 1000)])
+@pytest.mark.parametrize("limits", [{"kept": 2000}, {"kept": COUNT}])
+def test_nor_does_what_is_kept_of_motors_depend_on_chunks(chunk, wait, limits):
+    first, second = DRIVEN.record(chunk, wait, **limits), DRIVEN.record(COUNT, **limits)
+    same(first, second)
+    if first.samples is not None:
+        for name in MOTORS:
+            assert_array_equal(first.samples.read(name, 1), DRIVEN.motors[name][:, 1])
+        assert_array_equal(first.samples.read("line"), DRIVEN.line)
+
+
+def test_a_long_motion_keeps_the_extremes_of_torque_gain_and_what_the_observer_misses():
+    signals = DRIVEN.record(1000, kept=2000)
+    motors = DRIVEN.motors
+    measures = [
+        *naive.sample_measures(np.column_stack([*DRIVEN.motions, *DRIVEN.errors]), 4),
+        np.abs(motors["torque"]).max(axis=1),
+        np.abs(motors["estimate"] - motors["load"]).max(axis=1),
+        motors["gain_ratio"].max(axis=1),
+    ]
+    assert signals.bucket == picks(True) * signals.factor
+    kept = naive.extremes(np.array(measures), signals.bucket)
+    assert kept.size <= picks(True) * BUCKETS // 2
+    assert_array_equal(signals.time, kept * SAMPLE_TIME)
+    assert_array_equal(signals.tool, DRIVEN.motions[2][kept])
+    for name in MOTORS:
+        assert_array_equal(getattr(signals.motors, name), motors[name][kept])
+
+
+def test_a_torque_that_is_not_finite_stops_the_run_and_is_named():
+    motion = Motion(1000, JOINTS)
+    motion.motors["estimate"][700, 1] = np.nan
+    with pytest.raises(InfeasibleError, match=r"estimate of Z of the case shaped is nan at t = 0.7 s"):
+        motion.record(64, 10)
+
+
+@pytest.mark.parametrize(("told", "announced"), [(JOINTS, ("x", "y")), ((), JOINTS), (JOINTS, ())])
+def test_motors_other_than_those_announced_are_our_own_bug(told, announced):
+    with pytest.raises(ValueError, match="motors"):
+        Motion(10, told).record(10, announced=announced)
+
+
+# --- the archive ----------------------------------------------------------------------------------
 
 
 def test_one_sample_more_than_are_kept_thins_the_archive():

@@ -427,6 +427,7 @@ def test_check_tells_the_margins_at_home():
     loop = check_machine(bundled("mill_three_axis.yaml"))["loop"]
     assert set(loop) == {
         "gain_margin", "phase_margin_deg", "max_sensitivity", "largest_stable_cross_coupling_per_s",
+        "velocity_loop_gain_margin_db", "velocity_loop_phase_margin_deg", "velocity_loop_max_sensitivity",
     }  # fmt: skip
     assert 5.0 < loop["gain_margin"] < 30.0
     assert 40.0 < loop["phase_margin_deg"] < 70.0

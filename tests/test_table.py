@@ -13,6 +13,7 @@ import pytest
 from runs import make_run
 
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.motors import MotorDuty
 from cnc_shape.pipeline import CaseSummary, Deviation, Summary
 from cnc_shape.report.table import change, columns, micrometres, summary_json, table_text, tables_csv
 from cnc_shape.units import DEGREE
@@ -35,6 +36,59 @@ LONG = summary(
     case("shaped+cross_coupled+disturbance_observer", 0.002),
     case("shaped+cross_coupled+disturbance_observer+inertia_compensation", 1e-9),
 )
+
+
+MOTORS = tuple(MotorDuty(joint, 7.1, 1.25, 2.5, 2.4, 0.03, 4.6e-4) for joint in ("x", "y"))
+DISTURBED = summary(
+    case("independent", 2.0),
+    case("independent+disturbed", 8.0, disturbed=True, motors=MOTORS),
+    case("cross_coupled+disturbance_observer+inertia_compensation", 1.0),
+    case(
+        "cross_coupled+disturbance_observer+inertia_compensation+disturbed",
+        4.0,
+        disturbed=True,
+        motors=MOTORS,
+    ),
+)
+
+
+def test_like_is_compared_with_like():
+    change_of = next(column for column in columns(DISTURBED) if column.name == "change")
+    assert [cell[0] for cell in change_of.cells] == ["", "", "-50 %", "-50 %"]
+    assert "disturbed rows are compared with the first of them" in " ".join(table_text(DISTURBED).split())
+    assert "compared" not in table_text(LONG)
+    assert [cell[0] for cell in columns(summary(*DISTURBED.cases[1::2]))[1].cells] == ["", "-50 %"]
+
+
+def test_a_disturbed_row_stands_under_its_undisturbed_self():
+    lines = table_text(DISTURBED, 180).splitlines()
+    names = [line[:55].rstrip() for line in lines]
+    first = names.index("independent")
+    assert names[first : first + 4] == [
+        "independent", "  + disturbed", "cross_coupled+disturbance_observer+inertia_compensation", "  + disturbed",
+    ]  # fmt: skip
+    alone = table_text(summary(*DISTURBED.cases[1::2]), 180)
+    assert "independent+disturbed" in alone
+
+
+def test_names_are_folded_before_numbers_are():
+    lines = table_text(DISTURBED, 120).splitlines()
+    assert "24.6 / 91.2" in next(line for line in lines if line.startswith("independent"))
+    assert "+ inertia_compensation" in lines
+
+
+def test_what_motors_had_to_do_is_in_the_json_where_there_are_any():
+    rows = summary_json(DISTURBED)["cases"]
+    assert "motors" not in rows[0]
+    assert rows[1]["motors"][1] == {
+        "joint": "y", "peak_torque_nm": 7.1, "rms_torque_nm": 1.25, "peak_load_nm": 2.5,
+        "peak_gain_ratio": 2.4, "saturated_share": 0.03, "identified_inertia_kg_m2": 4.6e-4,
+    }  # fmt: skip
+    bad = replace(MOTORS[1], rms_torque=nan)
+    with pytest.raises(InfeasibleError, match="motor_y_rms_torque_nm of the case loaded is nan"):
+        summary_json(summary(case("loaded", motors=(MOTORS[0], bad))))
+    (row,) = csv.DictReader(io.StringIO(tables_csv(summary(case(motors=MOTORS)))))
+    assert float(row["motor_y_identified_inertia_kg_m2"]) == 4.6e-4
 
 
 def test_json_is_the_contract():
@@ -89,7 +143,7 @@ def test_change_is_against_the_first_row():
 
 
 @pytest.mark.parametrize("width", [80, 81, 100, 119, 120, 200])
-@pytest.mark.parametrize("what", [summary(), LONG, make_run(500).summary])
+@pytest.mark.parametrize("what", [summary(), LONG, DISTURBED, make_run(500).summary])
 def test_every_number_stands_whole_at_80_columns_and_more(width, what):
     text = table_text(what, width)
     assert max(map(len, text.splitlines())) <= width

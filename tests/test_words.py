@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import fields, replace
 
 import numpy as np
-from runs import make_run
+from runs import driven, make_run
 
+from cnc_shape.motors import MotorDuty
 from cnc_shape.pipeline import CaseSummary, Deviation, Summary
-from cnc_shape.report.words import price_of_shaping, verdict, worst_places
+from cnc_shape.report.words import price_of_shaping, saturations, verdict, worst_places
 
 RUN = make_run(2000)
 
@@ -44,6 +45,44 @@ def test_one_case_has_no_rival():
 
 def test_a_machine_without_error_is_no_division_by_zero():
     assert "0.00 µm" in verdict(summary(case("a", 0.0, 0.0, 1.0), case("b", 0.0, 0.0, 1.0)))
+
+
+def test_where_rows_are_disturbed_the_best_of_them_is_told_against_the_first_of_them():
+    rows = (
+        case("independent", 0.0014, 0.005, 10.0),
+        replace(case("independent+disturbed", 0.0045, 0.0177, 10.0), disturbed=True),
+        case("disturbance_observer", 0.0013, 0.003, 10.0),
+        replace(case("disturbance_observer+disturbed", 0.0018, 0.0044, 10.0), disturbed=True),
+    )
+    assert verdict(summary(*rows)) == (
+        "Independent, the tool leaves the programmed path by up to 5.00 µm (line 7) and 1.40 µm RMS; "
+        "independent+disturbed, by up to 17.7 µm (line 7) and 4.50 µm RMS; disturbance_observer+disturbed, "
+        "by up to 4.40 µm (line 7) and 1.80 µm RMS, 60 % less, in the same time."
+    )
+    assert "no other disturbed case does better" in verdict(
+        summary(*rows[:3], replace(rows[3], tool=rows[1].tool))
+    )
+    assert verdict(summary(*rows[:2])).endswith("4.50 µm RMS; the program takes 10.000 s.")
+    assert "60 % less" in verdict(summary(rows[1], rows[3]))
+
+
+def test_a_motor_at_its_limit_is_a_warning_with_joint_case_and_share():
+    motors = tuple(
+        MotorDuty(joint, 7.1, 1.0, 2.5, 1.0, share, 4.6e-4)
+        for joint, share in (("x", 0.0321), ("y", 0.01), ("z", 1.0))
+    )
+    rows = (case("independent", 0.1, 0.1, 1.0), replace(case("loaded", 0.1, 0.1, 1.0), motors=motors))
+    (told,) = saturations(summary(*rows))
+    assert told.startswith("loaded: torque at its limit, motor X for 3.21 %, motor Z for 100 % of the time")
+
+
+def test_the_worst_places_of_a_disturbed_case_are_told_against_the_first_disturbed_one():
+    run = driven(600)
+    run = replace(run, signals=(run.signals[0], replace(run.signals[1], tool_error=2.0 * run.signals[1].tool_error),
+                                *run.signals[2:]))  # fmt: skip
+    first = run.signals[1]
+    for place in worst_places(run, "disturbance_observer+disturbed"):
+        assert place.first_error == first.tool_error[first.line == place.line].max()
 
 
 def test_the_price_is_the_command_s_own_error_and_the_gain_is_calm():

@@ -221,6 +221,12 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
             *(("", f"{mode['axis'].upper()}: {mode['summary']}") for mode in result["position_modes"]),
             ("shapers", shapers or "none"),
             ("loop", _loop(result["loop"])),
+            *([("motors", ", ".join(result["motor_terms"]))] if result["motor_terms"] else []),
+            *(
+                [("disturbed", "; ".join(map(_disturbance, result["disturbances"])))]
+                if result["disturbances"]
+                else []
+            ),
         ]
     because = f" ({result['dialect_evidence']})" if result["dialect_evidence"] else ""
     moves = ", ".join(f"{count} {name}" for name, count in result["moves"].items() if count) or "none"
@@ -242,3 +248,9 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
             "  ".join(f"{axis.upper()} {value:.3f}" for axis, value in result["final_position"].items()),
         ),
     ]
+
+
+def _disturbance(entry: dict[str, Any]) -> str:
+    if entry["type"] == "encoder_noise":
+        return f"encoder_noise {entry['standard_deviation_counts']:g} counts"
+    return f"{entry['direction']} {entry['largest_torque_nm']:g} N m {entry['profile']}"

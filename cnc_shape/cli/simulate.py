@@ -38,7 +38,11 @@ def simulate(
         typer.Option("--all-signals", help="With --report: every sample in signals.npz, however many."),
     ] = False,
     cases: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Rows of the table, such as unshaped,shaped.")
+        str | None,
+        typer.Option(
+            metavar="A,B",
+            help="Rows of the table, such as unshaped,shaped+cross_coupled or independent+disturbed.",
+        ),
     ] = None,
     fail_on: Annotated[
         list[str] | None,
@@ -66,6 +70,7 @@ def simulate(
     from cnc_shape.opening import open_motion
     from cnc_shape.pipeline import run
     from cnc_shape.report.table import summary_json
+    from cnc_shape.report.words import saturations
     from cnc_shape.trade import Trade
 
     gates = [parse_gate(text) for text in fail_on or []]
@@ -94,6 +99,7 @@ def simulate(
             blocks, setup, picked, motion.name, record=wanted, all_signals=all_signals, observers=observers
         )
     page, kinds = None, () if trade is None else trade.rows()
+    notes = [*slowed_notes(slowed, setup), *saturations(result.summary)]
     if wanted:
         from cnc_shape.api import report_context
 
@@ -101,10 +107,10 @@ def simulate(
             "simulate", motion.name, *(["--cases", cases] if cases else []),
             *(["--all-signals"] if all_signals else []),
         ]  # fmt: skip
-        told = [*motion.warnings(by_name=True), *slowed_notes(slowed, setup)]
+        told = [*motion.warnings(by_name=True), *notes]
         context = report_context([source], setup, command, told, kind)
         page = _report(result, output, context, kinds, force=force)
-    warn([*motion.warnings(), *slowed_notes(slowed, setup)], quiet=quiet)
+    warn([*motion.warnings(), *notes], quiet=quiet)
     if json:
         extra: dict[str, Any] = slowed_json(slowed) | ({} if page is None else {"report": str(page)})
         if kinds:

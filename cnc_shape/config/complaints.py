@@ -8,14 +8,12 @@ from typing import Final, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from cnc_shape.config.models import DRIVES_NOT_BUILT
 from cnc_shape.config.strict import suggestion
 from cnc_shape.config.yaml_tree import Place, Tree, dotted
 from cnc_shape.errors import ConfigError
 
 Path = tuple[str | int, ...]
 
-_TYPES_NOT_BUILT: Final = {"drive": DRIVES_NOT_BUILT}
 _EXPECTED: Final = {
     "float_type": "a number",
     "int_type": "a whole number",
@@ -39,7 +37,7 @@ def complaint(source: str, tree: Tree, error: ValidationError) -> ConfigError:
     """Return the first thing that is wrong in the file, as an error at its place."""
     found = [_located(tree, detail) for detail in error.errors(include_url=False)]
     place, path, detail = min(found, key=lambda item: (item[0].line, item[0].column))
-    reason, hint = _words(path, detail)
+    reason, hint = _words(detail)
     return ConfigError(source, place.line, place.column, f"{dotted(path) or 'the file'}: {reason}", hint=hint)
 
 
@@ -81,7 +79,7 @@ def _context(detail: ErrorDetails) -> Mapping[str, object]:
     return detail.get("ctx", {})
 
 
-def _words(path: Path, detail: ErrorDetails) -> tuple[str, str]:
+def _words(detail: ErrorDetails) -> tuple[str, str]:
     """Return what is wrong with a value, and what to do about it."""
     kind, value, context = detail["type"], detail["input"], _context(detail)
     if kind in ("key", "value"):
@@ -92,7 +90,7 @@ def _words(path: Path, detail: ErrorDetails) -> tuple[str, str]:
     if kind == "union_tag_not_found":
         return "type is missing", "add type: with the name of one"
     if kind in ("union_tag_invalid", "literal_error"):
-        return _word(path, kind, value, context)
+        return _word(kind, value, context)
     if kind in _EXPECTED:
         return f"must be {_EXPECTED[kind]}, not {_shown(value)}", _kind_hint(kind, value)
     if kind in _RELATIONS:
@@ -109,13 +107,10 @@ def _words(path: Path, detail: ErrorDetails) -> tuple[str, str]:
     return detail["msg"][:1].lower() + detail["msg"][1:], "check the value"
 
 
-def _word(path: Path, kind: str, value: object, context: Mapping[str, object]) -> tuple[str, str]:
+def _word(kind: str, value: object, context: Mapping[str, object]) -> tuple[str, str]:
     known = str(context["expected_tags" if kind == "union_tag_invalid" else "expected"])
     words = [word.strip(" '") for word in known.replace(" or ", ",").split(",")]
-    owner = str(path[-2]) if len(path) > 1 else ""
     given = cast("Mapping[str, object]", value)["type"] if kind == "union_tag_invalid" else value
-    if isinstance(given, str) and given in _TYPES_NOT_BUILT.get(owner, ()):
-        return f"{given} is not built yet", "use " + " or ".join(words)
     choice = " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
     return f"must be {choice}, not {_shown(given)}", suggestion(str(given), words)
 

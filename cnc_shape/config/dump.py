@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from math import inf, isfinite, nextafter
+from math import isfinite
 
 import yaml
 
+from cnc_shape.config.dump_motors import compensation_keys, disturbance_list, motor_keys
 from cnc_shape.config.mode_tables import dump_mode_table
 from cnc_shape.config.setup import Planning, Setup
+from cnc_shape.config.spelling import to_degrees
 from cnc_shape.controllers import Control, CrossCoupling
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive
+from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive, ServoMotor
 from cnc_shape.modes import Mode
 from cnc_shape.program import ROTARY
-from cnc_shape.units import DEGREE
 
 LINE_LENGTH = 110
 
@@ -40,7 +41,11 @@ def dump_machine(setup: Setup) -> str:
         "control": _control(setup.control),
     }
     if setup.machine.joints:
-        document["joints"] = [{"drive": _drive(drive)} for drive in setup.machine.joints]
+        names = setup.kinematics.joints
+        drives = zip(setup.machine.joints, names, strict=True)
+        document["joints"] = [{"drive": _drive(drive, name)} for drive, name in drives]
+    if setup.disturbances:
+        document["disturbances"] = disturbance_list(setup.disturbances)
     if setup.tools:
         document["tools"] = [
             {"number": tool.number, "length_mm": tool.length, "diameter_mm": tool.diameter}
@@ -77,7 +82,7 @@ def _axis(axis: Axis, setup: Setup) -> dict[str, object]:
         "limits": _degrees(axis.limits) if axis.name in ROTARY else _millimetres(axis.limits)
     }
     if axis.drive != IdealDrive():
-        keys["drive"] = _drive(axis.drive)
+        keys["drive"] = _drive(axis.drive, axis.name)
     if axis.modes:
         keys["modes"] = [_mode(mode) for mode in axis.modes]
     if choice := setup.choices.get(axis.name):
@@ -85,9 +90,11 @@ def _axis(axis: Axis, setup: Setup) -> dict[str, object]:
     return keys
 
 
-def _drive(drive: Drive) -> dict[str, object]:
+def _drive(drive: Drive, moved: str) -> dict[str, object]:
     if isinstance(drive, FirstOrderLag):
         return {"type": "first_order_lag", "time_constant_s": drive.time_constant, "gain": drive.gain}
+    if isinstance(drive, ServoMotor):
+        return motor_keys(drive, moved)
     return {"type": "ideal"}
 
 
@@ -111,17 +118,6 @@ def _degrees(limits: Limits) -> dict[str, object]:
     return {key.replace("_mm", "_deg"): value for key, value in keys.items()}
 
 
-def to_degrees(angle: float) -> float:
-    """Return the shortest number of degrees that is read back as exactly this `angle`, rad."""
-    nearest = angle / DEGREE
-    if not isfinite(nearest):
-        return nearest
-    below, above = nextafter(nearest, -inf), nextafter(nearest, inf)
-    near = [nextafter(below, -inf), below, nearest, above, nextafter(above, inf)]
-    same = [degrees for degrees in near if degrees * DEGREE == angle]
-    return min(same, key=lambda degrees: len(repr(degrees)), default=nearest)
-
-
 def _mode(mode: Mode) -> dict[str, object]:
     keys: dict[str, object] = {
         "frequency_hz": mode.natural_frequency,
@@ -133,7 +129,7 @@ def _mode(mode: Mode) -> dict[str, object]:
     if mode.damping_uncertainty:
         keys["damping_uncertainty"] = mode.damping_uncertainty
     if mode.table is not None:
-        keys["over_position"] = dump_mode_table(mode.table, to_degrees)
+        keys["over_position"] = dump_mode_table(mode.table)
     return keys
 
 
@@ -151,7 +147,7 @@ def _control(control: Control) -> dict[str, object]:
         keys["cross_coupling"] = _cross_coupling(couple)
     if control.jacobian_every != 1:
         keys["jacobian_every"] = control.jacobian_every
-    return keys
+    return keys | compensation_keys(control)
 
 
 def _cross_coupling(couple: CrossCoupling) -> dict[str, object]:

@@ -5,28 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cnc_shape.config.complaints import key_place, locate
+from cnc_shape.config.drives import drive_of
 from cnc_shape.config.kinematics import choice_of, kinematics_of
-from cnc_shape.config.models import (
-    AnyDrive,
-    FirstOrderLagModel,
-    LinearAxisModel,
-    MachineModel,
-    RotaryAxisModel,
-)
+from cnc_shape.config.models import LinearAxisModel, MachineModel, RotaryAxisModel
 from cnc_shape.config.setup import KinematicsChoice
 from cnc_shape.config.yaml_tree import Tree, refuse
 from cnc_shape.joints import CARTESIAN
 from cnc_shape.kinematics import Kinematics
-from cnc_shape.machine import Drive, FirstOrderLag, IdealDrive
+from cnc_shape.machine import Drive, IdealDrive
 
 AxisModels = Mapping[str, LinearAxisModel | RotaryAxisModel]
-
-
-def drive_of(model: AnyDrive | None) -> Drive:
-    """Return the drive that a model describes; none is an ideal one."""
-    if isinstance(model, FirstOrderLagModel):
-        return FirstOrderLag(model.time_constant_s, model.gain)
-    return IdealDrive()
 
 
 def read_kinematics(model: MachineModel) -> tuple[KinematicsChoice, Kinematics]:
@@ -61,4 +49,7 @@ def read_joints(
     if len(model.joints) != len(kinematics.joints):
         reason = f"joints: {kinematics.name} has {len(kinematics.joints)} of them, not {len(model.joints)}"
         refuse(source, locate(tree, ("joints",))[0], reason, f"list one each for {names}, in this order")
-    return tuple(drive_of(joint.drive) for joint in model.joints)
+    return tuple(
+        drive_of(source, tree, ("joints", index, "drive"), joint.drive, name)
+        for index, (joint, name) in enumerate(zip(model.joints, kinematics.joints, strict=True))
+    )

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf, isfinite, log10
 
 import numpy as np
 
 from cnc_shape.config.setup import Setup
-from cnc_shape.controllers.margins import worst_margins
+from cnc_shape.controllers import Control
+from cnc_shape.controllers.loop_model import lags
+from cnc_shape.controllers.margins import Margins, servo_margins, worst, worst_margins
+from cnc_shape.controllers.servo_model import gain_ratios, held_apart
 from cnc_shape.controllers.stability import (
     DIRECTIONS,
     cartesian_loop,
@@ -17,8 +22,10 @@ from cnc_shape.controllers.stability import (
 )
 from cnc_shape.joints import joints_of
 from cnc_shape.kinematics.reach import CONDITION_LIMIT, condition
-from cnc_shape.machine import FirstOrderLag
+from cnc_shape.machine import Drive, ServoMotor
 from cnc_shape.units import DEGREE
+
+NOTHING = Margins(inf, inf, inf, inf)  # where there is no loop: nothing to tell
 
 
 def check_loop(setup: Setup) -> dict[str, float | None]:
@@ -26,7 +33,9 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
 
     Home is where all axes stand at 0. Null where there is no end, as without any drive that
     lags, or where the machine cannot stand there. The largest cross-coupling is that of the file's ratios of
-    integral and derivative to proportional gain, or of a proportional one.
+    integral and derivative to proportional gain, or of a proportional one. Margins of velocity loops are
+    those of servo motors at their torque, the worst of all joints wherever a compensation may take the gain;
+    null without such motors.
 
     Raises
     ------
@@ -44,19 +53,35 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
         held = condition(joints.kinematics, origin)[0] <= CONDITION_LIMIT
         home = joints.inverse_jacobian(origin)[held]
         check_poses([axis.drive for axis in axes], control, home)
+        others = replace(control, cross_coupling=None, joint_gains=control.joint_gains[joints.coupled :])
+        check_stability(joints.drives[joints.coupled :], others)
     drives = [axis.drive for axis in axes]
-    if not len(home) or not any(isinstance(drive, FirstOrderLag) for drive in drives):
-        return _summary(np.inf, np.inf, np.inf, np.inf)
-    margins = worst_margins(drives, control, home[0], DIRECTIONS)
-    largest = largest_stable_coupling(drives, control, home)
-    return _summary(margins.gain, margins.phase / DEGREE, margins.sensitivity, largest)
-
-
-def _summary(gain: float, phase: float, sensitivity: float, coupling: float) -> dict[str, float | None]:
+    outer, coupling = NOTHING, np.inf
+    if len(home) and any(lags(drive) for drive in drives):
+        outer = worst(
+            worst_margins(drives, held, home[0], DIRECTIONS) for held in held_apart(drives, control)
+        )
+        coupling = largest_stable_coupling(drives, control, home)
+    inner = _velocity_loops([axis.drive for axis in joints.drives], setup.control)
     numbers = {
-        "gain_margin": gain,
-        "phase_margin_deg": phase,
-        "max_sensitivity": sensitivity,
+        "gain_margin": outer.gain,
+        "phase_margin_deg": outer.phase / DEGREE,
+        "max_sensitivity": outer.sensitivity,
         "largest_stable_cross_coupling_per_s": coupling,
+        "velocity_loop_gain_margin_db": 20.0 * log10(inner.gain),
+        "velocity_loop_phase_margin_deg": inner.phase / DEGREE,
+        "velocity_loop_max_sensitivity": inner.sensitivity,
     }
     return {name: float(number) if isfinite(number) else None for name, number in numbers.items()}
+
+
+def _velocity_loops(drives: Sequence[Drive], control: Control) -> Margins:
+    """Worst margins of the servo motors at their torque, over the ratios that their gains may come to."""
+    gains = control.joint_gains or (control.position_gain,) * len(drives)
+    found = [
+        servo_margins(drive, replace(control, position_gain=gain), ratio)
+        for drive, gain in dict.fromkeys(zip(drives, gains, strict=True))
+        if isinstance(drive, ServoMotor)
+        for ratio in gain_ratios((drive,), control)
+    ]
+    return worst(found) if found else NOTHING

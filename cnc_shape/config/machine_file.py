@@ -13,7 +13,9 @@ from pydantic import ValidationError
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.complaints import complaint, key_place, locate
 from cnc_shape.config.control import read_control
-from cnc_shape.config.joints import AxisModels, drive_of, read_joints, read_kinematics
+from cnc_shape.config.disturbances import read_disturbances
+from cnc_shape.config.drives import Drives, check_ticks, drive_of
+from cnc_shape.config.joints import AxisModels, read_joints, read_kinematics
 from cnc_shape.config.mode_tables import read_mode_table
 from cnc_shape.config.models import (
     AxesModel,
@@ -98,6 +100,7 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     )
     if not axes:
         refuse(source, locate(tree, ("axes",))[0], "axes: a machine needs an axis", "add x: with its limits")
+    check_ticks(source, tree, _drives(machine), model.control.sample_time_s)
     choices = {name: choice for name, axis in axes.items() if (choice := _choice(axis))}
     planning = planning_of(source, tree, model.planning)
     shapers = {name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()}
@@ -110,7 +113,8 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     setup = Setup(
         machine=machine,
         planning=planning,
-        control=read_control(source, tree, model.control, kinematics),
+        control=read_control(source, tree, model.control, machine, kinematics),
+        disturbances=read_disturbances(source, tree, model.disturbances, machine, kinematics),
         tools=_tools(source, tree, model),
         choices=choices,
         shapers=shapers,
@@ -181,7 +185,14 @@ def _axis(source: str, tree: Tree, name: str, model: LinearAxisModel | RotaryAxi
         plain = Limits(plain.velocity, plain.acceleration, jerk * unit)
     if travel is not None:
         plain = Limits(plain.velocity, plain.acceleration, plain.jerk, (travel[0] * unit, travel[1] * unit))
-    return Axis(name, plain, drive_of(model.drive), _modes(source, tree, name, model.modes))
+    drive = drive_of(source, tree, ("axes", name, "drive"), model.drive, name)
+    return Axis(name, plain, drive, _modes(source, tree, name, model.modes))
+
+
+def _drives(machine: Machine) -> Drives:
+    """Every drive by where it stands in the file."""
+    joints: Drives = {("joints", index, "drive"): drive for index, drive in enumerate(machine.joints)}
+    return {**joints, **{("axes", axis.name, "drive"): axis.drive for axis in machine.axes}}
 
 
 def _modes(source: str, tree: Tree, axis: str, models: list[ModeModel]) -> tuple[Mode, ...]:

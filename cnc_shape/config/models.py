@@ -1,35 +1,28 @@
 """The keys of a machine file: their types, units, bounds and defaults.
 
 The bounds are those within which a number can be meant: beyond them it is a slip of the pen, or asks for
-more memory than there is.
+more memory than there is. Drives, compensation and disturbances have files of their own.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
+from cnc_shape.config.bounds import Gain, Interval, Length, Positive, Share
+from cnc_shape.config.compensation_models import (
+    DisturbanceObserverModel,
+    FrictionFeedforwardModel,
+    InertiaCompensationModel,
+    InertiaIdentificationModel,
+)
+from cnc_shape.config.disturbance_models import AnyDisturbance
+from cnc_shape.config.drive_models import AnyDrive
 from cnc_shape.config.kinematics import AnyKinematics
 from cnc_shape.config.mode_models import OverPositionModel
 from cnc_shape.config.shaper_options import AnyShaper
-from cnc_shape.config.strict import Strict, refuse_value
-
-Positive = Annotated[float, Field(gt=0.0, le=1e9)]
-Gain = Annotated[float, Field(ge=0.0, le=1e6)]
-Share = Annotated[float, Field(ge=0.0, le=10.0)]
-Length = Annotated[float, Field(ge=0.0, le=1e6)]
-Coordinate = Annotated[float, Field(ge=-1e9, le=1e9)]
-Duration = Annotated[float, Field(ge=1e-6, le=1e3)]
-
-
-def _increasing(bounds: list[float]) -> list[float]:
-    if bounds[0] >= bounds[1]:
-        refuse_value(f"the lower end {bounds[0]:g} is not below the upper end {bounds[1]:g}", "swap them")
-    return bounds
-
-
-Interval = Annotated[list[Coordinate], Field(min_length=2, max_length=2), AfterValidator(_increasing)]
+from cnc_shape.config.strict import Strict
 
 
 class LinearLimits(Strict):
@@ -48,24 +41,6 @@ class RotaryLimits(Strict):
     acceleration_deg_s2: Positive
     jerk_deg_s3: Annotated[float, Field(gt=0.0, le=1e12)] | None = None
     travel_deg: Interval | None = None
-
-
-class IdealDriveModel(Strict):
-    """A drive that is where it is told to be; the same as no drive."""
-
-    type: Literal["ideal"]
-
-
-class FirstOrderLagModel(Strict):
-    """A velocity drive ``v' = (gain * u - v) / time_constant``."""
-
-    type: Literal["first_order_lag"]
-    time_constant_s: Duration
-    gain: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
-
-
-DRIVES_NOT_BUILT = frozenset({"servo_motor"})
-AnyDrive = Annotated[IdealDriveModel | FirstOrderLagModel, Field(discriminator="type")]
 
 
 class ModeModel(Strict):
@@ -150,13 +125,16 @@ class CrossCouplingModel(Strict):
 class ControlModel(Strict):
     """The servo loop."""
 
-    keys_not_built: ClassVar[frozenset[str]] = frozenset({"disturbance_observer", "inertia_compensation"})
     sample_time_s: Annotated[float, Field(ge=1e-6, le=1.0)] = 1e-3
     position_gain_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
     delay_samples: Annotated[int, Field(ge=0, le=1000)] = 0
     feedforward: FeedforwardModel | None = None
     cross_coupling: CrossCouplingModel | None = None
     jacobian_every: Annotated[int, Field(ge=1, le=10**6)] = 1
+    disturbance_observer: DisturbanceObserverModel | None = None
+    inertia_compensation: InertiaCompensationModel | None = None
+    friction_feedforward: FrictionFeedforwardModel | None = None
+    inertia_identification: InertiaIdentificationModel | None = None
 
 
 class ToolModel(Strict):
@@ -170,11 +148,11 @@ class ToolModel(Strict):
 class MachineModel(Strict):
     """A whole machine file."""
 
-    keys_not_built: ClassVar[frozenset[str]] = frozenset({"disturbances"})
     name: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     kinematics: AnyKinematics | None = None
     axes: AxesModel
     joints: list[JointModel] | None = None
     planning: PlanningModel = PlanningModel()
     control: ControlModel = ControlModel()
+    disturbances: list[AnyDisturbance] = Field(default_factory=list[AnyDisturbance], max_length=100)
     tools: list[ToolModel] = Field(default_factory=list[ToolModel], max_length=1000)

@@ -1,14 +1,13 @@
 """Strict: the model that every part of a machine file is checked by, and what it says when it refuses.
 
-An unknown key is refused with the nearest known one. What belongs to the contract of the machine file but
-is not built yet is refused by that name, so that nobody waits for an effect that does not come.
+An unknown key is refused with the nearest known one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import ClassVar, NoReturn, cast
+from typing import NoReturn, cast
 
 from pydantic import BaseModel, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
@@ -19,16 +18,12 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
-    keys_not_built: ClassVar[frozenset[str]] = frozenset()
-
     @model_validator(mode="before")
     @classmethod
     def _know_every_key(cls, data: object) -> object:
         if not isinstance(data, Mapping):
             return data
         for key in cast("Mapping[str, object]", data):
-            if key in cls.keys_not_built:
-                refuse_key(key, "not built yet", "remove it")
             if key not in cls.model_fields:
                 refuse_key(key, "unknown key", suggestion(key, list(cls.model_fields)))
         return cast("object", data)

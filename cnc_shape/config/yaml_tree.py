@@ -21,7 +21,7 @@ from cnc_shape.errors import ConfigError
 
 MAX_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 16
-MAX_VALUES: Final = 10_000
+MAX_VALUES: Final = 25_000
 
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")

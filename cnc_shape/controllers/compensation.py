@@ -21,7 +21,7 @@ class GainLaw(Enum):
     LITERAL = 1  # Kv = alpha A J / 2 as printed (paper 003, eq 17)
     LITERAL_INVERSE = 2  # Kv = 2 / (alpha A J), what eqs 15 and 16 say
     FIXED = 3  # always the largest ratio
-    TRIGGERED = 4  # the largest ratio while the load's own displacement is beyond a threshold
+    TRIGGERED = 4  # grows with the displacement under load, all joints together, up to a threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class InertiaCompensation:
     forgetting: float = 0.995  # - per ms, of the agreement between model and contour error
     law: GainLaw = GainLaw.EFFECTIVE_INERTIA
     scale_integral_time: bool = False  # the integral time falls as the gain rises
-    threshold: float = 5e-3  # mm, of GainLaw.TRIGGERED
+    threshold: float = 5e-3  # mm, displacement at which GainLaw.TRIGGERED is at the largest ratio
     torque_speed_slope: float = 3.32  # rad/s per N m, alpha of the literal readings
 
 

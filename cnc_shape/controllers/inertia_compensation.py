@@ -16,7 +16,7 @@ The gain is 1 without load, to the bit. What is raised is stiffness: the true in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp
+from math import exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -127,21 +127,32 @@ def displace(gains, motors, observer, j, load, memory):
 
 
 @kernel
-def step(gains, motors, j, deviation, known, watched, memory):
+def displacement(motors, memory):
+    """How far the joints yield to their loads by the model, as a vector's length, mm. memory (j,10)."""
+    square = 0.0
+    for j in range(motors.pitch.size):
+        if motors.servo[j]:
+            square += (motors.pitch[j] * memory[j, ANGLE]) ** 2
+    return sqrt(square)
+
+
+@kernel
+def step(gains, motors, j, deviation, known, yielding, watched, memory):
     """Set the gain ratio of motor j for the coming sample.
 
     deviation mm: where the joint is minus where the nearest point of the path would have it; known: 1 where
-    there is a path; watched (j,6) of the observer; memory (j,10).
+    there is a path; yielding mm: how far all joints yield together; watched (j,6) of the observer; memory
+    (j,10).
     """
     believed = motors.believed[j]
     load = watched[j, watching.LOAD]
     acceleration = watching.acceleration(motors, j, watched)
     memory[j, LOAD] += gains.window * (load - memory[j, LOAD])
     memory[j, ACCELERATION] += gains.window * (acceleration - memory[j, ACCELERATION])
-    displacement = motors.pitch[j] * memory[j, ANGLE]
+    moved = motors.pitch[j] * memory[j, ANGLE]
     if known:
-        memory[j, CROSS] = gains.forgetting * memory[j, CROSS] + displacement * deviation
-        memory[j, SQUARE] = gains.forgetting * memory[j, SQUARE] + displacement * displacement
+        memory[j, CROSS] = gains.forgetting * memory[j, CROSS] + moved * deviation
+        memory[j, SQUARE] = gains.forgetting * memory[j, SQUARE] + moved * moved
         if memory[j, SQUARE] > ENOUGH:
             memory[j, AGREEMENT] = memory[j, CROSS] / memory[j, SQUARE]
         else:
@@ -156,7 +167,7 @@ def step(gains, motors, j, deviation, known, watched, memory):
     if gains.law == FIXED:
         wanted = gains.largest
     elif gains.law == TRIGGERED:
-        wanted = gains.largest if abs(displacement) > gains.threshold else 1.0
+        wanted = 1.0 + (gains.largest - 1.0) * min(yielding / gains.threshold, 1.0)
     elif gains.law == LITERAL:
         smallest = SMALLEST_RATIO
         wanted = 0.5 * gains.slope * share * (believed + inertia) / bandwidth

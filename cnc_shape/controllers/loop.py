@@ -179,6 +179,7 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                         told[j] += inverse[row, j, i] * speed[i]
                     for i in range(3, solved):
                         told[j] += inverse[row, j, i] * couple_gains.orientation * tracking[i]
+        yielding = inertia_compensation.displacement(motors, turning.compensation) if compensate.acts else 0.0
         for j in range(joints):
             drive[k, j] = told[j]
             s = states[j]
@@ -211,7 +212,9 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                     waiting[late.shape[0] - 1, j] = fed[j]
                 watched, compensated = turning.observer, turning.compensation
                 if compensate.acts:
-                    inertia_compensation.step(compensate, motors, j, deviation, known, watched, compensated)
+                    inertia_compensation.step(
+                        compensate, motors, j, deviation, known, yielding, watched, compensated
+                    )
                 if identify.acts:
                     inertia_identification.step(identify, motors, j, watched, turning.identification)
                 if friction.acts:

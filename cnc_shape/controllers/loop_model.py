@@ -16,6 +16,9 @@ Whatever the estimator, next to a straight path its contour error is the tangent
 adds is left out, as is that pose and tangent change.
 
 Of the scalar form, which is not linear, the proportional part is taken: it acts as that of the vector form.
+
+A servo motor runs several ticks of its velocity loop in one tick of the loop; see `servo_model`. Its velocity
+gain is the one it starts with: `servo_model.at_ratio` holds it elsewhere.
 """
 
 from __future__ import annotations
@@ -26,11 +29,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cnc_shape.arrays import FloatArray
+from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.cross_coupling import CrossCoupling, Form
+from cnc_shape.controllers.servo_model import LinearDrive, lifted
 from cnc_shape.limits import Limits
-from cnc_shape.machine import Axis, Drive, FirstOrderLag
+from cnc_shape.machine import Axis, Drive, IdealDrive, ServoMotor
 from cnc_shape.plant import discretise
 
 NO_REACH = 1e-9  # -, share of the largest contour error below which the drives cannot make one that way
@@ -39,14 +43,15 @@ UNBOUNDED = Limits(np.inf, np.inf)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LoopModel:
-    """The loop of j lag drives at n pairs of pose and tangent."""
+    """The loop of j drives, none ideal, of up to s states each, at n pairs of pose and tangent."""
 
     sample_time: float  # s
     delay_samples: int
     coupling: CrossCoupling  # in vector form
     gains: FloatArray  # (j,) 1/s, of the position loops
-    drives: FloatArray  # (j,2,2) transition of position and velocity
-    held: FloatArray  # (j,2) answer to a command held over the sample
+    drives: FloatArray  # (j,s,s) transition of position and all else; the position moves nothing but itself
+    held: FloatArray  # (j,s) answer to a command held over the sample
+    orders: IntArray  # (j,) states in use
     across: FloatArray  # (n,3,j) contour error per joint error
     back: FloatArray  # (n,j,3) joint velocity per Cartesian velocity
     turn: FloatArray  # (n,j,j) joint velocity of the orientation term per joint error
@@ -60,7 +65,7 @@ class LoopModel:
     def states(self) -> int:
         """Of the closed loop."""
         remembered = 3 * (self.coupling.integral != 0.0) + 3 * (self.coupling.derivative != 0.0)
-        return (2 + self.delay_samples) * self.gains.size + remembered
+        return int(self.orders.sum()) + self.delay_samples * self.gains.size + remembered
 
 
 def loop_model(
@@ -88,19 +93,25 @@ def loop_model(
     coupling = _in_vector_form(control.cross_coupling)
     turn = np.zeros((rows, joints, joints))
     turn[:, :size, :size] = coupling.orientation * inverse_jacobians[:, :, linear:] @ forward[:, linear:]
-    lagging = np.array([isinstance(drive, FirstOrderLag) for drive in drives], dtype=bool)
+    lagging = np.array([lags(drive) for drive in drives], dtype=bool)
     across = (made - tangents[:, :, None] * (tangents[:, None, :] @ made))[:, :, lagging]
     moved = np.sqrt((made[:, :, lagging] ** 2).sum(axis=1))
     gains = np.array(control.joint_gains or [control.position_gain] * joints, dtype=np.float64)
-    axes = [Axis("", UNBOUNDED, drive) for drive in drives if isinstance(drive, FirstOrderLag)]
-    plant = discretise(axes, control.sample_time) if axes else None
+    known = {drive: _linear(drive, control) for drive in drives if lags(drive)}
+    linears = [known[drive] for drive in drives if lags(drive)]
+    orders = [drive.held.size for drive in linears]
+    most = max(orders, default=1)
+    transition, held = np.zeros((len(linears), most, most)), np.zeros((len(linears), most))
+    for row, (order, drive) in enumerate(zip(orders, linears, strict=True)):
+        transition[row, :order, :order], held[row, :order] = drive
     return LoopModel(
         control.sample_time,
         control.delay_samples,
         coupling,
         gains[lagging],
-        np.zeros((0, 2, 2)) if plant is None else plant.transition,
-        np.zeros((0, 2)) if plant is None else plant.held,
+        transition,
+        held,
+        np.array(orders, dtype=np.int64),
         across,
         back[:, lagging],
         turn[:, lagging][:, :, lagging],
@@ -112,8 +123,9 @@ def loop_model(
 def open_loop(model: LoopModel) -> tuple[FloatArray, FloatArray, FloatArray]:
     """State space from the drives' input to the command that comes back: ``x+ = A x + B u, u = C x``.
 
-    States: positions and velocities of the drives (j each); where the controller has them, the integral (3)
-    and the contour error before (3); the commands on their way, oldest first (j each).
+    States: positions of the drives (j), their second states (j: of a lag the velocity), the third of those
+    that have one, and so on; where the controller has them, the integral (3) and the contour error before
+    (3); the commands on their way, oldest first (j each).
     Returns A (n,s,s), B (s,j) and C (n,j,s).
     """
     rows, joints, late = len(model), model.gains.size, model.delay_samples
@@ -121,14 +133,14 @@ def open_loop(model: LoopModel) -> tuple[FloatArray, FloatArray, FloatArray]:
     size = model.states
     A, B, told = np.zeros((rows, size, size)), np.zeros((size, joints)), np.zeros((rows, joints, size))
     j = np.arange(joints)
-    for row in range(2):
-        B[row * joints + j, j] = model.held[:, row]
-        for column in range(2):
-            A[:, row * joints + j, column * joints + j] = model.drives[:, row, column]
+    for joint, order in enumerate(model.orders):
+        own = np.array([_place(model.orders, joint, row) for row in range(order)])
+        B[own, joint] = model.held[joint, : own.size]
+        A[:, own[:, None], own] = model.drives[joint, : own.size, : own.size]
     differential = coupling.derivative / period
     told[:, :, :joints] = -model.turn - (coupling.proportional + differential) * model.back @ model.across
     told[:, j, j] -= model.gains
-    place = 2 * joints
+    place = int(model.orders.sum())
     if coupling.integral != 0.0:
         integral = slice(place, place + 3)
         told[:, :, integral] = coupling.integral * model.back
@@ -161,8 +173,9 @@ def loop_transfer(model: LoopModel, z: NDArray[np.complex128]) -> NDArray[np.com
         + coupling.derivative * (1.0 - 1.0 / z) / period
     )
     # position per command of a drive, whose transition is [[1, be], [0, al]]
-    moving = model.held[:, 1] / (z[:, None] - model.drives[:, 1, 1])
-    drive = (model.held[:, 0] + model.drives[:, 0, 1] * moving) / (z[:, None] - 1.0)
+    inner = z[:, None, None, None] * np.eye(model.held.shape[1] - 1) - model.drives[:, 1:, 1:]
+    moving = np.linalg.solve(inner, model.held[:, 1:, None])[..., 0]
+    drive = (model.held[:, 0] + (model.drives[:, 0, 1:] * moving).sum(axis=-1)) / (z[:, None] - 1.0)
     answer = (model.back @ model.across)[:, None] * controller[:, None, None]
     answer = answer + (np.diag(model.gains) + model.turn)[:, None]
     return answer * (drive / z[:, None] ** model.delay_samples)[:, None, :]
@@ -216,6 +229,7 @@ def joint_of(model: LoopModel, joint: int, gain: float) -> LoopModel:
         gains=np.array([gain]),
         drives=model.drives[joint : joint + 1],
         held=model.held[joint : joint + 1],
+        orders=model.orders[joint : joint + 1],
         across=np.zeros((1, 3, 1)),
         back=np.zeros((1, 1, 3)),
         turn=np.zeros((1, 1, 1)),
@@ -239,6 +253,24 @@ def rows_of(model: LoopModel, rows: NDArray[np.intp]) -> LoopModel:
         lever=model.lever[rows],
         reach=model.reach[rows],
     )
+
+
+def _place(orders: IntArray, joint: int, row: int) -> int:
+    """Where among the states of all drives one of a joint stands."""
+    return int(np.minimum(orders, row).sum() + (orders[:joint] > row).sum())
+
+
+def lags(drive: Drive) -> bool:
+    """Whether a drive is ever elsewhere than it is told to be."""
+    return not isinstance(drive, IdealDrive)
+
+
+def _linear(drive: Drive, control: Control) -> LinearDrive:
+    """A drive from sample to sample."""
+    if isinstance(drive, ServoMotor):
+        return lifted(drive, control)
+    plant = discretise([Axis("", UNBOUNDED, drive)], control.sample_time)
+    return LinearDrive(plant.transition[0], plant.held[0])
 
 
 def _in_vector_form(coupling: CrossCoupling | None) -> CrossCoupling:

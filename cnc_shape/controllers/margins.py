@@ -4,11 +4,14 @@ The loop has as many channels as drives. Its Nyquist curves are the eigenvalues 
 along the unit circle: det(1 + k L) = 0 where k = -1/lambda, so a gain or a phase that changes alike in all
 drives is told exactly by where they cross the negative real axis and the unit circle. What drives that change
 unlike each other may do is told by the largest singular value of (1 + L)^-1, the maximum sensitivity.
+
+A servo motor has a loop of its own besides, at its torque: there its inertia, its current loop and what the
+controllers take them for come in (`servo_margins`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +20,12 @@ from numpy.typing import NDArray
 from cnc_shape.arrays import BoolArray, FloatArray
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.loop_model import LoopModel, loop_model, loop_transfer, rows_of
-from cnc_shape.machine import Drive
+from cnc_shape.controllers.servo_model import at_ratio, ticks_of, torque_transfer
+from cnc_shape.machine import Drive, ServoMotor
 
 GRID = 160  # frequencies, evenly on a logarithmic scale up to half the sample rate
 PER_DELAY = 10  # frequencies more for each sample of delay, evenly: each turns the curves by half a circle
+MOST_EVEN = 2000  # ticks of delay that the frequencies of a motor's loop are made for
 SLOWEST = 1e-2  # of the highest position gain: where the grid begins
 REFINED = 6  # times, each by REFINEMENT
 REFINEMENT = 8
@@ -30,6 +35,7 @@ NOTHING = 1e-9  # -, eigenvalues below are none
 
 Eigenvalues = NDArray[np.complex128]  # (f,j)
 Loci = Callable[[FloatArray], Eigenvalues]  # of frequencies (f,), rad/s
+Sizes = Callable[[FloatArray], FloatArray]  # of (1 + L)^-1 at frequencies (f,), rad/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +66,38 @@ def worst_margins(
     model = loop_model(drives, control, np.repeat(inverse_jacobian[None], count, axis=0), tangents)
     if not model.gains.size:
         return NO_LOOP
-    found = [_margins(rows_of(model, np.array([row]))) for row in range(count)]
+    return worst(_margins(rows_of(model, np.array([row]))) for row in range(count))
+
+
+def worst(several: Iterable[Margins]) -> Margins:
+    """Smallest of several margins, and largest sensitivity."""
+    found = list(several)
     return Margins(
         min(one.gain for one in found),
         min(one.phase for one in found),
         max(one.sensitivity for one in found),
         min(one.delay for one in found),
     )
+
+
+def servo_margins(motor: ServoMotor, control: Control, gain_ratio: float | None = None) -> Margins:
+    """Margins of a motor's stable velocity and position loop at its torque; see `servo_model`.
+
+    The position gain is that of `control`. The velocity gain is held at a ratio to the nominal one; without,
+    where the compensation of `control` starts it.
+    """
+    control = control if gain_ratio is None else at_ratio(control, gain_ratio)
+    ticks = ticks_of(motor, control.sample_time)
+    period = control.sample_time / ticks
+    late = min(ticks * (control.delay_samples + 1), MOST_EVEN)
+
+    def loci(frequencies: FloatArray) -> Eigenvalues:
+        return torque_transfer(motor, control, np.exp(1j * period * frequencies))[:, None]
+
+    def sizes(frequencies: FloatArray) -> FloatArray:
+        return 1.0 / np.abs(1.0 + loci(frequencies)[:, 0])
+
+    return _told(loci, sizes, _frequencies(period, control.position_gain, late))
 
 
 def largest_factors(base: LoopModel, whole: LoopModel) -> FloatArray:
@@ -95,31 +126,49 @@ def largest_factors(base: LoopModel, whole: LoopModel) -> FloatArray:
 
 
 def _margins(model: LoopModel) -> Margins:
-    grid = _grid(model)
+    identity = np.eye(model.gains.size)
+    scale = model.lever[0][:, None] / model.lever[0]
+
+    def transfer(frequencies: FloatArray) -> NDArray[np.complex128]:
+        return loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0]
 
     def loci(frequencies: FloatArray) -> Eigenvalues:
-        return _eigenvalues(loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0])
+        return _eigenvalues(transfer(frequencies))
 
+    def sizes(frequencies: FloatArray) -> FloatArray:
+        smallest = np.linalg.svd(identity + scale * transfer(frequencies), compute_uv=False)[:, -1]
+        return np.asarray(1.0 / smallest, dtype=np.float64)
+
+    return _told(loci, sizes, _grid(model))
+
+
+def _told(loci: Loci, sizes: Sizes, grid: FloatArray) -> Margins:
+    """Margins that Nyquist curves leave, and the largest of the sizes of (1 + L)^-1."""
     curves = loci(grid)
-    opposed, sizes = _opposed(loci, grid, curves)
+    opposed, reached = _opposed(loci, grid, curves)
     turned = _crossings(loci, grid, curves, _over_unit_circle)
     here = loci(turned)
     circled = np.abs(np.abs(here) - 1.0) < NEAR
     angle = np.angle(-here[circled])
     delay = np.mod(angle, 2.0 * np.pi) / np.broadcast_to(turned[:, None], here.shape)[circled]
     return Margins(
-        float((1.0 / sizes[sizes < 1.0]).min(initial=np.inf)),
+        float((1.0 / reached[reached < 1.0]).min(initial=np.inf)),
         float(np.abs(angle).min(initial=np.inf)),
-        _sensitivity(model, np.sort(np.concatenate([grid, opposed, turned]))),
+        _largest(sizes, np.sort(np.concatenate([grid, opposed, turned]))),
         float(delay.min(initial=np.inf)),
     )
 
 
 def _grid(model: LoopModel) -> FloatArray:
     """Frequencies up to half the sample rate, rad/s, so dense that the curves turn little between them."""
-    end = np.pi / model.sample_time
-    slowest = SLOWEST * min(float(model.gains.max()) or end, end)
-    even = np.linspace(0.0, end, PER_DELAY * model.delay_samples + 2)[1:]
+    return _frequencies(model.sample_time, float(model.gains.max()), model.delay_samples)
+
+
+def _frequencies(period: float, gain: float, late: int) -> FloatArray:
+    """Frequencies of a loop with a position gain in 1/s that ticks every `period`, `late` ticks late."""
+    end = np.pi / period
+    slowest = SLOWEST * min(gain or end, end)
+    even = np.linspace(0.0, end, PER_DELAY * late + 2)[1:]
     grid = np.union1d(np.geomspace(slowest, end, GRID), even)
     grid[-1] = end * (1.0 - 1e-9)
     return grid
@@ -177,25 +226,14 @@ def _over_negative_axis(curves: Eigenvalues) -> BoolArray:
     return ((before > 0.0) != (before + step > 0.0)).any(axis=1)
 
 
-def _sensitivity(model: LoopModel, grid: FloatArray) -> float:
-    """Largest singular value of (1 + L)^-1 over frequency, around the highest point of the grid.
-
-    A joint's motion counts by how far it moves the tool: else mm would stand against rad.
-    """
-    identity = np.eye(model.gains.size)
-    scale = model.lever[0][:, None] / model.lever[0]
-
-    def size(frequencies: FloatArray) -> FloatArray:
-        transfer = loop_transfer(model, np.exp(1j * model.sample_time * frequencies))[0]
-        smallest = np.linalg.svd(identity + scale * transfer, compute_uv=False)[:, -1]
-        return np.asarray(1.0 / smallest, dtype=np.float64)
-
-    sizes = size(grid)
-    largest = sizes.max()
+def _largest(sizes: Sizes, grid: FloatArray) -> float:
+    """Largest of the sizes over frequency, around the highest point of the grid."""
+    here = sizes(grid)
+    largest = here.max()
     for _ in range(REFINED):
-        top = int(np.argmax(sizes))
+        top = int(np.argmax(here))
         around = grid[max(top - 1, 0) : top + 2]
         grid = np.linspace(float(around[0]), float(around[-1]), 2 * REFINEMENT + 1)
-        sizes = size(grid)
-        largest = max(largest, sizes.max())
+        here = sizes(grid)
+        largest = max(largest, here.max())
     return float(largest)

@@ -2,6 +2,10 @@
 
 Along the path every joint is held by its position gain alone, across it by the cross-coupling as well. So the
 joints are looked at one by one first, then the whole loop at poses and directions of the path.
+
+Before both, each servo motor's velocity loop is looked at by itself (`velocity_loops`). Where a compensation
+moves its gain, all this is done with the gain held, at ratios between the lowest and the highest that it may
+come to: a loop that is unstable at one of them is so for as long as a load keeps the gain there.
 """
 
 from __future__ import annotations
@@ -13,12 +17,14 @@ from itertools import product
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.controllers.bisection import GAIN_RESOLUTION, MOST_GROWTH, largest_factor
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.cross_coupling import CrossCoupling
 from cnc_shape.controllers.loop_model import (
     UNBOUNDED,
     LoopModel,
     joint_of,
+    lags,
     loop_model,
     pole_radius,
     rows_of,
@@ -26,14 +32,13 @@ from cnc_shape.controllers.loop_model import (
     without_turn,
 )
 from cnc_shape.controllers.margins import largest_factors
+from cnc_shape.controllers.servo_model import at_ratio, gain_ratios, held_apart
+from cnc_shape.controllers.velocity_loops import out_of_ratio, settles, unsettled
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.machine import Axis, Drive, FirstOrderLag
+from cnc_shape.machine import Axis, Drive, ServoMotor
 from cnc_shape.program import ROTARY, XYZ
 
-GAIN_RESOLUTION = 1e-5  # -, of the largest stable gain that is told
 MOST_STATES = 120  # of a loop whose poles are computed
-GROWTH = 1.5  # -, of the gain from one look to the next, upwards
-MOST_GROWTH = 1e6  # -, beyond which a gain has no end; its inverse is as good as none
 HINT = "lower position_gain_per_s or cross_coupling.proportional_per_s, or sample faster"
 
 Place = Callable[[int], str]  # index of a pose -> where that is, in words: "at x 20, y 15"
@@ -111,17 +116,14 @@ def largest_stable_coupling(
     Infinite where nothing ends it. The loop must be stable without cross-coupling.
     """
     coupling = control.cross_coupling or CrossCoupling(control.position_gain)
-    whole = loop_model(
-        drives, replace(control, cross_coupling=coupling), *_everywhere(inverse_jacobians, tangents)
-    )
-    return coupling.proportional * _largest_coupling(whole)
+    coupled, looked = replace(control, cross_coupling=coupling), _everywhere(inverse_jacobians, tangents)
+    factors = [_largest_coupling(loop_model(drives, held, *looked)) for held in held_apart(drives, coupled)]
+    return coupling.proportional * min(factors)
 
 
 def largest_stable_position_gain(drive: Drive, control: Control) -> float:
     """Largest position gain with which a joint is stable by itself, 1/s; infinite for an ideal drive."""
-    if not isinstance(drive, FirstOrderLag):
-        return np.inf
-    return _largest_gain(loop_model((drive,), control, np.zeros((0, 1, 1)), np.zeros((0, 3))), 0)
+    return _largest_gain_of(drive, control)[0] if lags(drive) else np.inf
 
 
 def cartesian_loop(axes: Sequence[Axis], control: Control) -> tuple[tuple[Axis, ...], Control]:
@@ -151,26 +153,24 @@ def _check(
     alike = len(set(drives)) == 1 and len(set(control.joint_gains)) < 2
     if alike:  # across the path the loop is one joint's under Kp + Kc, whatever the pose
         inverse_jacobians, tangents = inverse_jacobians[:1], tangents[:1]
-    model = loop_model(drives, control, inverse_jacobians, tangents)
-    lagging = [name for name, drive in zip(names, drives, strict=True) if isinstance(drive, FirstOrderLag)]
-    for joint, name in enumerate(lagging):
-        gain = float(model.gains[joint])
-        if not _stable_joint(model, joint, gain):
-            largest = _largest_gain(model, joint)
-            raise InfeasibleError(
-                f"the loop of {name} is unstable: position gain {gain:g} 1/s, stable below {largest:.4g} 1/s",
-                hint=HINT,
-            )
+    gains = control.joint_gains or (control.position_gain,) * len(drives)
+    for name, drive, gain in zip(names, drives, gains, strict=True):
+        if lags(drive):
+            _check_joint(name, drive, replace(_uncoupled(control), position_gain=gain))
     coupling = control.cross_coupling
-    if coupling is None or not lagging:
+    if coupling is None or not any(lags(drive) for drive in drives):
         return
-    held = with_coupling(model, 0.0)
-    if coupling.orientation:
-        _check_turn(held, _nowhere if alike else place)
-    reserve = _reserve(held, model)
-    if reserve.min(initial=1.0) > 0.0:
+    models = [loop_model(drives, held, inverse_jacobians, tangents) for held in held_apart(drives, control)]
+    stable = True
+    for model in models:
+        held = with_coupling(model, 0.0)
+        if coupling.orientation:
+            _check_turn(held, _nowhere if alike else place)
+        stable = stable and bool(_reserve(held, model).min(initial=1.0) > 0.0)
+    if stable:
         return
-    factor = _largest_coupling(model)
+    factors = [_largest_coupling(model) for model in models]
+    model, factor = models[int(np.argmin(factors))], min(factors)
     largest, worst = coupling.proportional * factor, _first_unstable(model, factor)
     where = "" if alike else f"{_told(place(worst))}, moving along {_direction(tangents[worst])}"
     pid = model.coupling.integral or model.coupling.derivative
@@ -180,6 +180,31 @@ def _check(
         f"{share}, stable below {largest:.4g} 1/s",
         hint=HINT,
     )
+
+
+def _check_joint(name: str, drive: Drive, control: Control) -> None:
+    """Refuse a joint that is unstable by itself, wherever its velocity gain may come to."""
+
+    def stable(ratio: float) -> bool:
+        held = at_ratio(control, ratio)
+        return _settles(drive, held) and _stable_alone(drive, held)
+
+    ratios = gain_ratios((drive,), control)
+    for ratio in ratios:
+        if isinstance(drive, ServoMotor) and not settles(drive, at_ratio(control, ratio)):
+            raise unsettled(name, drive, control, ratio, stable)
+    for ratio in ratios:
+        if stable(ratio):
+            continue
+        if ratio > 1.0 and stable(1.0):
+            raise out_of_ratio(f"the loop of {name}", drive, control, ratio, stable)
+        largest, worst = _largest_gain_of(drive, control)
+        where = "" if worst == 1.0 else f" at {worst:.3g} times its velocity gain"
+        raise InfeasibleError(
+            f"the loop of {name} is unstable{where}: position gain {control.position_gain:g} 1/s, "
+            f"stable below {largest:.4g} 1/s",
+            hint=HINT,
+        )
 
 
 def _check_turn(held: LoopModel, place: Place) -> None:
@@ -205,6 +230,31 @@ def _everywhere(inverse_jacobians: FloatArray, tangents: FloatArray) -> tuple[Fl
     return np.repeat(inverse_jacobians, directions, axis=0), np.tile(tangents, (poses, 1))
 
 
+def _uncoupled(control: Control) -> Control:
+    return replace(control, cross_coupling=None, joint_gains=())
+
+
+def _settles(drive: Drive, control: Control) -> bool:
+    return not isinstance(drive, ServoMotor) or settles(drive, control)
+
+
+def _alone(drive: Drive, control: Control) -> LoopModel:
+    """The loop of a joint by itself."""
+    return loop_model((drive,), _uncoupled(control), np.zeros((0, 1, 1)), np.zeros((0, 3)))
+
+
+def _largest_gain_of(drive: Drive, control: Control) -> tuple[float, float]:
+    """Largest position gain with which a joint is stable by itself, 1/s, and the ratio that ends it."""
+    return min(
+        (_largest_gain(_alone(drive, at_ratio(control, ratio)), 0), ratio)
+        for ratio in gain_ratios((drive,), control)
+    )
+
+
+def _stable_alone(drive: Drive, control: Control) -> bool:
+    return _stable_joint(_alone(drive, control), 0, control.position_gain)
+
+
 def _stable_joint(model: LoopModel, joint: int, gain: float) -> bool:
     return bool(_reserve(joint_of(model, joint, 0.0), joint_of(model, joint, gain))[0] > 0.0)
 
@@ -215,7 +265,7 @@ def _largest_gain(model: LoopModel, joint: int) -> float:
     whole = joint_of(model, joint, unit)
     if whole.states > MOST_STATES:
         return unit * float(largest_factors(joint_of(model, joint, 0.0), whole)[0])
-    return unit * _largest_factor(lambda factor: _stable_joint(model, joint, unit * factor))
+    return unit * largest_factor(lambda factor: _stable_joint(model, joint, unit * factor))
 
 
 def _reserve(base: LoopModel, whole: LoopModel) -> FloatArray:
@@ -241,7 +291,7 @@ def _largest_coupling(model: LoopModel) -> float:
             suspects = rows_of(suspects, unstable)
         return not unstable.size
 
-    return _largest_factor(stable)
+    return largest_factor(stable)
 
 
 def _first_unstable(model: LoopModel, factor: float) -> int:
@@ -250,19 +300,6 @@ def _first_unstable(model: LoopModel, factor: float) -> int:
         return int(largest_factors(with_coupling(model, 0.0), model).argmin())
     beyond = max((1.0 + 2.0 * GAIN_RESOLUTION) * factor, 1.0 / MOST_GROWTH)
     return int(pole_radius(with_coupling(model, beyond)).argmax())
-
-
-def _largest_factor(stable: Callable[[float], bool]) -> float:
-    """Largest factor with which a loop that is stable at 0 is stable, from 1 upwards or below 1."""
-    low, high = 0.0, 1.0
-    while stable(high):
-        low, high = high, GROWTH * high
-        if high > MOST_GROWTH:
-            return np.inf
-    while high - low > GAIN_RESOLUTION * high and high > 1.0 / MOST_GROWTH:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
 
 
 def _told(place: str) -> str:

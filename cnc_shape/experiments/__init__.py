@@ -17,6 +17,7 @@ PAPERS: Final[Mapping[str, str]] = {
     "000": "cnc_shape.experiments.measuring_machine",
     "001": "cnc_shape.experiments.multi_mode",
     "002": "cnc_shape.experiments.specified_duration",
+    "003": "cnc_shape.experiments.inertia_compensation",
     "004": "cnc_shape.experiments.contour_control",
 }
 

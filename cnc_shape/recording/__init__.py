@@ -7,7 +7,8 @@ A million blocks make tens of millions of samples, more than memory should hold.
 
 `Extremes` keeps up to 131,072 samples as they are. A longer motion it keeps in buckets of equal width, and of
 each bucket the samples where the tool, the drives or the command is farthest from the path, where the tool is
-nearest, and where following error, deflection, speed or acceleration is largest. The width is a power of two
+nearest, and where following error, deflection, speed or acceleration is largest; where there are servo
+motors also where torque, gain or what the observer misses of the load is largest. The width is a power of two
 that goes with the number of samples, and the best of two buckets is the best of their bests: what is kept
 does not depend on how the samples came in chunks. The worst places always stay.
 
@@ -19,6 +20,6 @@ The programmed path, as a polyline to draw, is thinned alike: a bucket keeps its
 
 from cnc_shape.recording.outline import Outline
 from cnc_shape.recording.recorder import KEPT, Recorder
-from cnc_shape.recording.signals import PICKS, Samples, Signals, require_finite
+from cnc_shape.recording.signals import MOTORS, PICKS, Samples, Signals, picks, require_finite
 
-__all__ = ["KEPT", "PICKS", "Outline", "Recorder", "Samples", "Signals", "require_finite"]
+__all__ = ["KEPT", "MOTORS", "PICKS", "Outline", "Recorder", "Samples", "Signals", "picks", "require_finite"]

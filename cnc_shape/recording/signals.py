@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen
 from cnc_shape.errors import InfeasibleError
+from cnc_shape.response import MotorSignals
 from cnc_shape.writers.spool import Spool
 
 PICKS = 8  # samples of a bucket that are kept at most
+MOTOR_PICKS = 3  # as many more where there are servo motors
 MOTIONS = ("command", "position", "tool", "velocity", "acceleration")  # columns of an axis each
 ERRORS = ("command_error", "drive_error", "tool_error")
+MOTORS = tuple(item.name for item in fields(MotorSignals) if item.name != "joints")  # columns of a motor each
 
 
 class Samples:
     """Every sample of one case, in a nameless file that vanishes with this value."""
 
-    def __init__(self, axes: tuple[str, ...], sample_time: float, spool: Spool) -> None:
-        self._axes, self._sample_time, self._spool = axes, sample_time, spool
+    def __init__(
+        self, axes: tuple[str, ...], sample_time: float, spool: Spool, motors: tuple[str, ...] = ()
+    ) -> None:
+        self._sample_time, self._spool = sample_time, spool
+        self._columns = columns(len(axes), len(motors))
 
     def __len__(self) -> int:
         return len(self._spool)
@@ -31,13 +37,14 @@ class Samples:
         Parameters
         ----------
         name
-            Of `Signals`: ``time``, ``command``, ``tool_error``, ``line`` and so on, but for ``foot``.
+            Of `Signals` or its `motors`: ``time``, ``command``, ``tool_error``, ``line``, ``torque`` and so
+            on, but for ``foot``.
         axis
-            Which column, where the signal has one an axis.
+            Which column, where the signal has one an axis or one a motor.
         """
         if name == "time":
             return self._times()
-        return self._spool.pieces(columns(len(self._axes))[name].start + axis)
+        return self._spool.pieces(self._columns[name].start + axis)
 
     def read(self, name: str, axis: int = 0) -> FloatArray:
         """Return a whole signal, (n,); it has to fit in memory."""
@@ -71,6 +78,7 @@ class Signals:
     settling_time: FloatArray  # (m,) s, after the end of the motion
     settling: FloatArray  # (m,d) mm or rad, tool minus drive then
     samples: Samples | None = None  # every sample, where more were kept than are here
+    motors: MotorSignals | None = None  # where any joint has a servo motor; as many rows as `time`
 
     def __post_init__(self) -> None:
         if self.command.shape != (self.time.size, len(self.axes)):
@@ -82,7 +90,7 @@ class Signals:
     @property
     def bucket(self) -> int:
         """How many samples those kept were chosen from at a time; 1: every sample is here."""
-        return self.factor * PICKS if self.factor > 1 else 1
+        return self.factor * picks(self.motors is not None) if self.factor > 1 else 1
 
     @property
     def source(self) -> Signals | Samples:
@@ -91,13 +99,21 @@ class Signals:
 
     def pieces(self, name: str, axis: int = 0) -> Iterator[FloatArray]:
         """Yield a signal as `Samples.pieces` does, in one piece."""
-        values: FloatArray = getattr(self, name)
+        values: FloatArray = getattr(self.motors if name in MOTORS else self, name)
         yield values if values.ndim == 1 else values[:, axis]
 
 
-def columns(axes: int) -> dict[str, slice]:
+def picks(has_motors: bool) -> int:
+    """How many samples of a bucket are kept at most."""
+    return PICKS + MOTOR_PICKS if has_motors else PICKS
+
+
+def columns(axes: int, motors: int = 0) -> dict[str, slice]:
     """Where the signals lie in a row; all but ``foot``, the last, are spooled."""
-    widths = {**dict.fromkeys(MOTIONS, axes), **dict.fromkeys(ERRORS, 1), "line": 1, "foot": 3}
+    widths = {
+        **dict.fromkeys(MOTIONS, axes), **dict.fromkeys(ERRORS, 1), "line": 1,
+        **dict.fromkeys(MOTORS, motors), "foot": 3,
+    }  # fmt: skip
     ends = np.cumsum(list(widths.values())).tolist()
     return {name: slice(end - width, end) for (name, width), end in zip(widths.items(), ends, strict=True)}
 

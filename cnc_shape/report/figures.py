@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, floor, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.pipeline import Run
 from cnc_shape.program import ROTARY
 from cnc_shape.recording import Signals
+from cnc_shape.report.rows import UNDER, is_mixed, row_names
 from cnc_shape.report.style import PATH_COLOUR, WIDTH, look, new_figure, styled
 from cnc_shape.units import MICROMETRE
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 PANELS = 3  # paths side by side at most
 DRAWN = 1_000  # buckets of a line over time; the worst and the best of each is drawn
 DRAWN_PATH = 20_000  # points of a path that are drawn
+TITLE = 24  # characters of a narrow title
+LABEL = 48  # characters of a label that stands for several cases
+LETTER, HANDLE, LINE = 0.073, 0.55, 0.18  # inch, of a legend
+DOTS = (0, (1.2, 1.2))
 MAGNIFIED_SHARE = 0.1  # of the part's size: how large the largest contour error is drawn
 
 
@@ -38,6 +43,19 @@ def worst_rows(values: FloatArray, buckets: int = DRAWN) -> IntArray:
         for offset in (int(values[low:high].argmax()), int(values[low:high].argmin()))
     ]
     return np.unique(np.array([0, *picks, n - 1]))
+
+
+def looks(run: Run) -> list[dict[str, Any]]:
+    """How every case's line looks: a disturbed one has the colour of its undisturbed, dotted self."""
+    if not is_mixed(run.summary):
+        return [look(k) for k in range(len(run.signals))]
+    found: list[dict[str, Any]] = []
+    colours = 0
+    for name, case in zip(row_names(run.summary), run.summary.cases, strict=True):
+        colours += not name.startswith(UNDER)
+        style = look(colours - 1)
+        found.append(style if case.disturbed else {**style, "linestyle": DOTS})
+    return found
 
 
 def _magnification(run: Run) -> float:
@@ -66,7 +84,7 @@ def _magnified(signals: Signals, factor: float, rows: IntArray) -> FloatArray:
 @styled
 def path_figure(run: Run) -> Figure:
     """Programmed path, and drives and tool of every case with their distance to it magnified."""
-    factor, (i, j) = _magnification(run), _plane(run)
+    factor, (i, j), cases = _magnification(run), _plane(run), looks(run)
     count = len(run.signals)
     extent = np.ptp(run.path, axis=0)[[i, j]] if run.path.size else np.ones(2)
     slope = min(max(extent[1] / max(extent[0], 1e-9), 0.12), 1.4)
@@ -82,7 +100,8 @@ def path_figure(run: Run) -> Figure:
         programmed = ax.plot(run.path[:, i], run.path[:, j], color=PATH_COLOUR, linewidth=2.2, alpha=0.45)
         kept = worst_rows(signals.tool_error, DRAWN_PATH // 2)
         drawn = _magnified(signals, factor, kept)
-        tool = ax.plot(drawn[:, i], drawn[:, j], **look(k, width=0.8))
+        style = cases[k] if cases[k]["linestyle"] != DOTS else {**cases[k], "linestyle": "-"}
+        tool = ax.plot(drawn[:, i], drawn[:, j], **{**style, "linewidth": 0.8})
         worst = int(signals.tool_error.argmax())
         mark = _magnified(signals, factor, np.array([worst]))
         circle = ax.plot(
@@ -121,10 +140,10 @@ def error_figure(run: Run) -> Figure:
     """Contour error of the tool over time, and of the drives, one line a case."""
     figure, axes = new_figure(WIDTH, 4.4, 2, 1, sharex=True)
     for ax, name, title in zip(axes, ("tool_error", "drive_error"), ("Tool", "Drives"), strict=True):
-        for k, signals in enumerate(run.signals):
+        for signals, style in zip(run.signals, looks(run), strict=True):
             values = getattr(signals, name)
             rows = worst_rows(values)
-            ax.plot(signals.time[rows], values[rows] / MICROMETRE, **look(k), label=signals.case)
+            ax.plot(signals.time[rows], values[rows] / MICROMETRE, **style, label=signals.case)
         ax.set_title(title)
         ax.set_ylabel("contour error (µm)")
         ax.set_ylim(bottom=0.0)
@@ -138,12 +157,14 @@ def error_figure(run: Run) -> Figure:
 def motion_figure(run: Run) -> Figure:
     """Speed and acceleration of every case's command over time; cases with one command share a line."""
     figure, axes = new_figure(WIDTH, 4.4, 2, 1, sharex=True)
-    for k, (names, signals) in _by_command(run).items():
+    commands = _by_command(run)
+    for k, (names, signals) in commands.items():
+        label = "all cases" if len(names) > 2 and len(commands) == 1 else _several(names)
         speed = np.sqrt((signals.velocity[:, :3] ** 2).sum(axis=1))
         acceleration = np.abs(signals.acceleration[:, :3]).max(axis=1, initial=0.0)
         for ax, values in zip(axes, (speed, acceleration), strict=True):
             rows = worst_rows(values)
-            ax.plot(signals.time[rows], values[rows], **look(k), label=" = ".join(names))
+            ax.plot(signals.time[rows], values[rows], **look(k), label=label)
     axes[0].set_title("Path speed of the command")
     axes[0].set_ylabel("speed (mm/s)")
     axes[1].set_title("Largest axis acceleration of the command")
@@ -177,13 +198,13 @@ def vibration_figure(run: Run) -> Figure:
     ]
     axis = linear[int(np.argmax(largest))]
     figure, (whole, rest) = new_figure(WIDTH, 2.8, 1, 2)
-    for k, signals in enumerate(run.signals):
+    for signals, style in zip(run.signals, looks(run), strict=True):
         values = (signals.tool[:, axis] - signals.position[:, axis]) / MICROMETRE
         rows = worst_rows(values)
-        whole.plot(signals.time[rows], values[rows], **look(k), label=signals.case)
+        whole.plot(signals.time[rows], values[rows], **style, label=signals.case)
         after = signals.settling[:, axis] / MICROMETRE
         rows = worst_rows(after)
-        rest.plot(signals.settling_time[rows], after[rows], **look(k))
+        rest.plot(signals.settling_time[rows], after[rows], **style)
     name = run.signals[0].axes[axis].upper()
     whole.set_title(f"Deflection in {name}: tool minus drive")
     whole.set_ylabel("deflection (µm)")
@@ -197,11 +218,23 @@ def vibration_figure(run: Run) -> Figure:
 
 
 def _folded(case: str) -> str:
-    """Name of a case for a narrow title: its last term on a line of its own."""
+    """Name of a case for a narrow title: its last term on a line of its own, or each if that is too wide."""
     head, plus, tail = case.rpartition("+")
+    if len(head) > TITLE:
+        return case.replace("+", "\n+ ")
     return f"{head}\n+ {tail}" if plus else case
 
 
+def _several(cases: Sequence[str]) -> str:
+    """A label for cases that share a line."""
+    label = " = ".join(cases)
+    return label if len(label) <= LABEL or len(cases) < 3 else f"{cases[0]} and {len(cases) - 1} more"
+
+
 def _legend(figure: Figure, ax: Axes) -> None:
+    """Name the lines below, in as many columns as fit; the figure grows with the lines that this takes."""
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4))
+    width = max(map(len, labels), default=1) * LETTER + HANDLE
+    columns = max(min(len(labels), 4, int(WIDTH / width)), 1)
+    figure.set_figheight(figure.get_figheight() + LINE * (ceil(len(labels) / columns) - 1))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)

@@ -19,9 +19,10 @@ from cnc_shape import __version__
 from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run
 from cnc_shape.program import ROTARY
-from cnc_shape.recording import Samples, Signals, require_finite
+from cnc_shape.recording import MOTORS, Samples, Signals, require_finite
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.motor_figures import motor_cases, motor_figure
 from cnc_shape.report.position_figure import modes_over_position, position_figure
 from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.style import Format, render
@@ -35,6 +36,9 @@ from cnc_shape.writers.publish import make_folder, publish_folder
 
 RUNS = "cnc-shape-runs"
 MARKER = "run.json"
+MOTOR_UNITS = {
+    "torque": "_nm", "load": "_nm", "estimate": "_nm", "effective_inertia": "_kg_m2", "inertia": "_kg_m2",
+}  # fmt: skip  # the others are ratios
 NAME_LETTERS = frozenset(string.ascii_letters + string.digits + "-_")
 
 
@@ -107,10 +111,13 @@ def write_report(
     drawn = draw(run, context)
     if trade:
         drawn["trade"] = trade_figure(trade)
+    driven = {signals.case: motor_figure(signals) for signals in motor_cases(run)}
+    drawn |= {_motor_file(case): figure for case, figure in driven.items()}
     svg = {name: render(figure, "svg") for name, figure in drawn.items()}
     page = Page(
-        svg, context.shapers, context.modes, context.warnings, context.program, context.machine, trade
-    )
+        svg, context.shapers, context.modes, context.warnings, context.program, context.machine, trade,
+        {case: svg[_motor_file(case)] for case in driven},
+    )  # fmt: skip
     kind = context.figure_format
     content = {
         "report.html": _encoded(render_html(run, page)),
@@ -137,12 +144,20 @@ def write_report(
     return folder / "report.html"
 
 
+def _motor_file(case: str) -> str:
+    """Name of a case's figure of motors, without what a file name may not hold."""
+    return "motors_" + "".join(c if c in NAME_LETTERS or c == "+" else "-" for c in case)
+
+
 def _require_finite(signals: Signals) -> None:
     for item in fields(Signals):
         values = getattr(signals, item.name)
         if isinstance(values, np.ndarray):
             time = signals.settling_time if item.name.startswith("settling") else signals.time
             require_finite(item.name, np.asarray(values, np.float64), signals.case, signals.axes, time)
+    if (motors := signals.motors) is not None:
+        for name in MOTORS:
+            require_finite(name, getattr(motors, name), signals.case, motors.joints, signals.time)
 
 
 def draw(run: Run, context: Context) -> dict[str, Any]:
@@ -163,7 +178,8 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
 def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any] | Stream]:
     """Arrays of `signals.npz`: time first, the unit in every name; ``<case>/<signal>_<axis>_<unit>``.
 
-    They hold every sample, or, of every 8 `decimation` samples, up to 8: see `cnc_shape.recording`.
+    They hold every sample, or, of every 8 `decimation` samples, up to 8: see `cnc_shape.recording`. Where
+    there are servo motors it is 11 instead of 8, and ``<case>/<signal>_<joint>_<unit>`` has what they did.
     """
     arrays: dict[str, NDArray[Any] | Stream] = {}
     for case in signals:
@@ -189,6 +205,10 @@ def signal_arrays(signals: Sequence[Signals]) -> dict[str, NDArray[Any] | Stream
             ("tool_contour_error_mm", "tool_error"),
         ):
             arrays[f"{stem}/{name}"] = _stream(case.source, signal)
+        for k, joint in enumerate(case.motors.joints if case.motors is not None else ()):
+            for signal in MOTORS:
+                unit = MOTOR_UNITS.get(signal, "")
+                arrays[f"{stem}/{signal}_{joint}{unit}"] = _stream(case.source, signal, k)
         arrays[f"{stem}/line"] = _stream(case.source, "line", dtype=np.int64)
         arrays[f"{stem}/decimation"] = np.array([case.factor if case.samples is None else 1])
     return arrays

@@ -13,16 +13,23 @@ from typing import Any
 
 from cnc_shape import __version__
 from cnc_shape.modes import Mode
-from cnc_shape.pipeline import Run
+from cnc_shape.pipeline import Run, Summary
+from cnc_shape.report.motor_figures import motor_cases
+from cnc_shape.report.rows import UNDER, best_case, compared_with, folded, is_mixed, row_names
 from cnc_shape.report.table import columns, micrometres
 from cnc_shape.report.text import one_line
 from cnc_shape.report.trade_table import HEADINGS, cells, explanation
-from cnc_shape.report.words import Place, best_case, price_of_shaping, verdict, worst_places
+from cnc_shape.report.words import Place, price_of_shaping, verdict, worst_places
 from cnc_shape.shapers import Shaper
 from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.trade import TradeRow
 
 LONGEST_LINE = 60  # characters of a program line that are shown
+LONGEST_NAME = 24  # characters of a case that stand on one line
+MOTOR_HEADINGS = (
+    ("peak torque", "N m"), ("torque, RMS", "N m"), ("at the limit", "% of time"), ("peak load", "N m"),
+    ("peak gain", "× nominal"), ("identified inertia", "kg m²"),
+)  # fmt: skip  # name, unit
 
 CAPTIONS = {
     "path": "The programmed path (grey) and the tool, its distance to the path magnified.",
@@ -49,6 +56,7 @@ class Page:
     program: Path | None = None  # where the program's text lies
     machine: str = ""  # the machine file
     trade: Sequence[TradeRow] = ()  # kinds of shaping side by side
+    motor_figures: Mapping[str, bytes] = field(default_factory=dict[str, bytes])  # SVG, by case
 
 
 NO_PAGE = Page()
@@ -70,13 +78,11 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
     environment = Environment(
         autoescape=True, trim_blocks=True, undefined=StrictUndefined, keep_trailing_newline=True
     )
-    summary, first, best = run.summary, run.summary.cases[0], best_case(run.summary)
+    summary, best = run.summary, best_case(run.summary)
+    first = compared_with(summary, best)
     archived = [signals for signals in run.signals if signals.samples is None]  # no more than is drawn
     pictures = {
-        name: {
-            "data": base64.b64encode(page.figures[name]).decode(),
-            "caption": caption + (_thinning(run) if name in FROM_SIGNALS else ""),
-        }
+        name: _picture(page.figures[name], caption + (_thinning(run) if name in FROM_SIGNALS else ""))
         for name, caption in CAPTIONS.items()
         if name in page.figures
     }
@@ -97,13 +103,22 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         columns=[(column.name, column.unit, column.numbers) for column in columns(summary)],
         rows=[
             {
-                "name": one_line(case.name),
+                "name": _on_lines(name.removeprefix(UNDER)),
+                "under": name.startswith(UNDER),
                 "best": case is best and best is not first,
                 "cells": [column.cells[k] for column in columns(summary)],
             }
-            for k, case in enumerate(summary.cases)
+            for k, (case, name) in enumerate(zip(summary.cases, row_names(summary), strict=True))
         ],
         figures=[picture for name, picture in pictures.items() if name not in ("shapers", "modes", "trade")],
+        mixed=is_mixed(summary),
+        motor_headings=MOTOR_HEADINGS,
+        motors=_motor_rows(summary),
+        motor_figures=[
+            _picture(page.motor_figures[signals.case], _motor_caption(signals.case) + _thinning(run))
+            for signals in motor_cases(run)
+            if signals.case in page.motor_figures
+        ],
         trade_headings=HEADINGS,
         trade_rows=[(row.name, cells(row)) for row in page.trade],
         trade_note=explanation(page.trade) if page.trade else "",
@@ -118,6 +133,42 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         factor=max((signals.factor for signals in archived), default=1),
         bucket=max((signals.bucket for signals in archived), default=1),
     )
+
+
+def _picture(svg: bytes, caption: str) -> dict[str, str]:
+    return {"data": base64.b64encode(svg).decode(), "caption": caption}
+
+
+def _on_lines(name: str) -> str:
+    return folded(name) if len(name) > LONGEST_NAME else name
+
+
+def _motor_caption(case: str) -> str:
+    return (
+        f"{one_line(case)}: torque of the motors, the load that was injected, and what was made of it. To an "
+        "observer the motor's own friction is a load too."
+    )
+
+
+def _motor_rows(summary: Summary) -> list[dict[str, Any]]:
+    """What every motor had to do, case by case; the case is named once."""
+    return [
+        {
+            "case": _on_lines(one_line(case.name)) if k == 0 else "",
+            "span": len(case.motors),
+            "joint": motor.joint.upper(),
+            "numbers": (
+                f"{motor.peak_torque:.3g}",
+                f"{motor.rms_torque:.3g}",
+                f"{100.0 * motor.saturated_share:.3g}",
+                f"{motor.peak_load:.3g}",
+                f"{motor.peak_gain_ratio:.3g}",
+                f"{motor.identified_inertia:.3g}",
+            ),
+        }
+        for case in summary.cases
+        for k, motor in enumerate(case.motors)
+    ]
 
 
 def _thinning(run: Run) -> str:

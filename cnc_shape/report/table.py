@@ -7,11 +7,12 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.pipeline import CaseSummary, Deviation, Summary
 from cnc_shape.program import ROTARY
+from cnc_shape.report.rows import best_case, compared_with, folded, is_mixed, row_names
 from cnc_shape.report.text import one_line
 from cnc_shape.units import DEGREE, MICROMETRE
 
@@ -28,7 +29,8 @@ def summary_json(summary: Summary) -> dict[str, Any]:
 
     Rotary axes have keys of their own, in thousandths of a degree, and only where there are any:
     ``following_rms_mdeg``, ``residual_vibration_mdeg``; so have machines that turn tool or workpiece:
-    ``orientation_rms_mdeg``, ``orientation_max_mdeg``, apart from the contour error.
+    ``orientation_rms_mdeg``, ``orientation_max_mdeg``, apart from the contour error. Where there are servo
+    motors, ``motors`` has what each of them had to do.
 
     Raises
     ------
@@ -68,6 +70,7 @@ def case_json(case: CaseSummary) -> dict[str, Any]:
         **by_unit("following_rms", case.following_rms),
         **by_unit("residual_vibration", case.residual_vibration),
         **_turn(case),
+        **_motors(case),
     }
 
 
@@ -77,6 +80,25 @@ def _turn(case: CaseSummary) -> dict[str, float]:
     return {
         "orientation_rms_mdeg": case.turn.rms / MILLIDEGREE,
         "orientation_max_mdeg": case.turn.max / MILLIDEGREE,
+    }
+
+
+def _motors(case: CaseSummary) -> dict[str, list[dict[str, Any]]]:
+    if not case.motors:
+        return {}
+    return {
+        "motors": [
+            {
+                "joint": motor.joint,
+                "peak_torque_nm": motor.peak_torque,
+                "rms_torque_nm": motor.rms_torque,
+                "peak_load_nm": motor.peak_load,
+                "peak_gain_ratio": motor.peak_gain_ratio,
+                "saturated_share": motor.saturated_share,
+                "identified_inertia_kg_m2": motor.identified_inertia,
+            }
+            for motor in case.motors
+        ]
     }
 
 
@@ -103,13 +125,16 @@ def tables_csv(summary: Summary) -> str:
 
 
 def _flatten(row: Mapping[str, Any]) -> dict[str, Any]:
-    """``{"following_rms_um": {"x": 1.0}}`` as ``{"following_rms_x_um": 1.0}``."""
+    """``{"following_rms_um": {"x": 1.0}}`` as ``{"following_rms_x_um": 1.0}``; motors: ``motor_x_<name>``."""
     flat: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, dict):
             stem, unit = key.rsplit("_", 1)
             for axis, number in value.items():  # pyright: ignore[reportUnknownVariableType]
                 flat[f"{stem}_{axis}_{unit}"] = number
+        elif isinstance(value, list):
+            for motor in cast("list[dict[str, Any]]", value):
+                flat |= {f"motor_{motor['joint']}_{name}": motor[name] for name in motor if name != "joint"}
         else:
             flat[key] = value
     return flat
@@ -165,20 +190,20 @@ class Column:
 
 def columns(summary: Summary) -> tuple[Column, ...]:
     """The table, most important columns first from the left; the case itself is not among them."""
-    cases, first = summary.cases, summary.cases[0]
+    cases = summary.cases
 
     def pair(deviation: Deviation) -> tuple[str, str]:
         return micrometres(deviation.rms), micrometres(deviation.max)
 
-    changes = [
-        ("", "") if c is first else (change(c.tool.rms, first.tool.rms), change(c.tool.max, first.tool.max))
-        for c in cases
-    ]
+    def changes(case: CaseSummary) -> tuple[str, str]:
+        now, first = case.tool, compared_with(summary, case).tool
+        return ("", "") if now is first else (change(now.rms, first.rms), change(now.max, first.max))
+
     turns = [case.turn for case in cases if case.turn is not None]
     turning = (Column("turned", "m°", tuple((_mdeg(t.rms), _mdeg(t.max)) for t in turns)),) if turns else ()
     return (
         Column("tool", "µm", tuple(pair(case.tool) for case in cases)),
-        Column("change", "of tool", tuple(changes)),
+        Column("change", "of tool", tuple(changes(case) for case in cases)),
         Column("drives", "µm", tuple(pair(case.drives) for case in cases)),
         Column("command", "µm", tuple(pair(case.command) for case in cases)),
         *turning,
@@ -191,17 +216,20 @@ def columns(summary: Summary) -> tuple[Column, ...]:
 def build_table(summary: Summary, width: int) -> Table:
     """Lay the table out for a terminal of `width` columns; numbers are never cut.
 
-    RMS and maximum stand side by side where there is room, else one above the other; a terminal that is
-    too narrow even so gets the columns that fit, from the left.
+    Names stand on one line and RMS and maximum side by side where there is room; else names are folded, then
+    RMS stands above the maximum. A terminal that is too narrow even so gets the columns that fit, from the
+    left.
     """
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
     shown, stacked, gap = columns(summary), False, 3
-    names = [one_line(case.name) for case in summary.cases]
+    names = row_names(summary)
     if _width(names, shown, gap, stacked=False) > width:
-        stacked, names = True, [name.replace("+", "\n+ ") for name in names]
+        names = [folded(name) for name in names]
+    if _width(names, shown, gap, stacked=False) > width:
+        stacked = True
         gap = 2 if _width(names, shown, 2, stacked=True) <= width else 1
         while _width(names, shown, gap, stacked=True) > width and len(shown) > 1:
             shown = shown[:-1]
@@ -210,6 +238,7 @@ def build_table(summary: Summary, width: int) -> Table:
         caption=Text(
             f"\ncontour error: RMS {'above' if stacked else '/'} maximum over all samples; "
             "vibration after the end and following error (RMS) of the worst axis"
+            + ("; disturbed rows are compared with the first of them" if is_mixed(summary) else "")
         ),
         box=box.SIMPLE_HEAD,
         title_justify="left",
@@ -225,11 +254,12 @@ def build_table(summary: Summary, width: int) -> Table:
     for column in shown:
         heading = Text(column.name, style="bold").append(f"\n{column.unit}", style="dim")
         table.add_column(heading, justify="right", no_wrap=True)
-    best = min(range(len(names)), key=lambda k: summary.cases[k].tool.rms)
+    best = best_case(summary)
+    improved = best is not compared_with(summary, best)
     rows = zip(*(_laid_out(column, stacked=stacked) for column in shown), strict=True)
-    for k, (name, row) in enumerate(zip(names, rows, strict=True)):
+    for case, name, row in zip(summary.cases, names, rows, strict=True):
         cells = [Text(cell) for cell in row]
-        if k == best and k > 0:
+        if improved and case is best:
             cells[0].stylize("bold green")
         table.add_row(Text(name), *cells)
     return table

@@ -9,39 +9,61 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.pipeline import CaseSummary, Run, Summary
 from cnc_shape.recording import Samples, Signals
+from cnc_shape.report.rows import best_case, compared_with, is_mixed
 from cnc_shape.report.table import micrometres, worst_linear
 
 WORST_PLACES = 10
+SATURATED = 0.01  # share of the time at the torque limit from which on it is worth a warning
 APART = 0.02  # share of the motion's time that two worst places lie apart at least
-
-
-def best_case(summary: Summary) -> CaseSummary:
-    """The case with the smallest RMS contour error of the tool; the first of equals."""
-    return min(summary.cases, key=lambda case: case.tool.rms)
 
 
 def verdict(summary: Summary) -> str:
     """What the run says, in one sentence with its numbers."""
-    first, best = summary.cases[0], best_case(summary)
-    worst = (
-        f"{_capital(first.name)}, the tool leaves the programmed path by up to "
-        f"{micrometres(first.tool.max)} µm{_at(first.tool.line)} and {micrometres(first.tool.rms)} µm RMS"
-    )
-    if len(summary.cases) == 1:
+    best = best_case(summary)
+    first = compared_with(summary, best)
+    rivals = [case for case in summary.cases if case.disturbed == best.disturbed]
+    if is_mixed(summary):
+        calm = next(case for case in summary.cases if not case.disturbed)
+        worst = f"{_capital(calm.name)}, the tool leaves the programmed path by {_reach(calm)}; "
+        worst += f"{first.name}, by {_reach(first)}"
+    else:
+        worst = f"{_capital(first.name)}, the tool leaves the programmed path by {_reach(first)}"
+    if len(rivals) == 1:
         return f"{worst}; the program takes {first.cycle_time:.3f} s."
     if best is first:
-        return f"{worst}, and no other case does better; the program takes {first.cycle_time:.3f} s."
+        other = "disturbed case" if is_mixed(summary) else "case"
+        return f"{worst}, and no other {other} does better; the program takes {first.cycle_time:.3f} s."
     return (
-        f"{worst}; {best.name}, by up to {micrometres(best.tool.max)} µm{_at(best.tool.line)} and "
-        f"{micrometres(best.tool.rms)} µm RMS, {100.0 * (1.0 - best.tool.rms / first.tool.rms):.0f} % less, "
+        f"{worst}; {best.name}, by {_reach(best)}, "
+        f"{100.0 * (1.0 - best.tool.rms / first.tool.rms):.0f} % less, "
         f"{_time_price(best.cycle_time - first.cycle_time, first.cycle_time)}."
     )
+
+
+def _reach(case: CaseSummary) -> str:
+    return (
+        f"up to {micrometres(case.tool.max)} µm{_at(case.tool.line)} and {micrometres(case.tool.rms)} µm RMS"
+    )
+
+
+def saturations(summary: Summary) -> list[str]:
+    """A warning for every case in which a motor is at its torque limit for more than 1 % of the time."""
+    found: list[str] = []
+    for case in summary.cases:
+        shares = {motor.joint: motor.saturated_share for motor in case.motors}
+        told = [f"motor {j.upper()} for {100.0 * s:.3g} %" for j, s in shares.items() if s > SATURATED]
+        if told:
+            found.append(
+                f"{case.name}: torque limit reached by {', '.join(told)} of the time; no more answers there"
+            )
+    return found
 
 
 def price_of_shaping(summary: Summary) -> str | None:
     """What shaping pays in rounded corners, where a command is longer than the first row's."""
     plain = summary.cases[0]
-    shaped = next((case for case in summary.cases if case.cycle_time > plain.cycle_time), None)
+    alike = [case for case in summary.cases if case.disturbed == plain.disturbed]
+    shaped = next((case for case in alike if case.cycle_time > plain.cycle_time), None)
     if shaped is None:
         return None
     lateness = (shaped.cycle_time - plain.cycle_time) * 1e3
@@ -64,15 +86,19 @@ class Place:
     line: int
     error: float  # mm, of the tool
     drive_error: float  # mm, of the drives at the same time
-    first_error: float | None  # mm, the largest of the first case on this line; None: it has no sample there
-    exact: bool  # whether every sample of the first case was there to find it
+    first_error: (
+        float | None
+    )  # mm, the largest on this line of the case that this one is compared with, or none
+    exact: bool  # whether every sample of that case was there to find it
     time: float  # s
     foot: FloatArray  # (3,) mm, on the path
 
 
 def worst_places(run: Run, case: str) -> list[Place]:
     """The worst places of a case, worst first, some time apart."""
-    signals, first = run.signal(case), run.signals[0]
+    signals = run.signal(case)
+    summary = next(summary for summary in run.summary.cases if summary.name == case)
+    first = run.signal(compared_with(run.summary, summary).name)
     apart = APART * float(np.ptp(signals.time)) if signals.time.size else 0.0
     left = signals.tool_error.copy()
     rows: list[int] = []
