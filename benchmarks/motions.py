@@ -11,7 +11,7 @@ from cnc_shape.limits import Limits
 from cnc_shape.readers import read_program
 from cnc_shape.smoothing import Path as SmoothPath
 from cnc_shape.smoothing import Smoothing, smooth
-from cnc_shape.toolpath import build_toolpath
+from cnc_shape.toolpath import Toolpath, build_toolpath
 from cnc_shape.trajectory import Trajectory, sample
 
 LIMITS = (Limits(500.0, 5000.0), Limits(500.0, 5000.0), Limits(200.0, 2000.0))
@@ -19,12 +19,17 @@ SAMPLE_TIME = 1e-3  # s
 TOLERANCE = Smoothing(0.01)  # mm
 
 
-def path(kind: str, blocks: int) -> SmoothPath:
-    """Return the C2 path of a generated program."""
+def toolpath(kind: str, blocks: int) -> Toolpath:
+    """Return the programmed path of a generated program."""
     with workshop() as folder:
         file: Path = folder / f"{kind}.nc"
         programs.write(kind, blocks, file)
-        return smooth(build_toolpath(read_program(file)), TOLERANCE)
+        return build_toolpath(read_program(file))
+
+
+def path(kind: str, blocks: int) -> SmoothPath:
+    """Return its C2 path."""
+    return smooth(toolpath(kind, blocks), TOLERANCE)
 
 
 def profile(kind: str, blocks: int) -> Profile:

@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from benchmarks.measuring import Kind, Row, best_of, not_built, report, workshop
+from benchmarks.measuring import Kind, Row, best_of, report, workshop
 from benchmarks.motions import LIMITS, SAMPLE_TIME, command
 from cnc_shape.arrays import frozen
 from cnc_shape.contour import contour_error
@@ -152,7 +152,6 @@ def rows() -> Iterator[Row]:
     stage, unit = "cross-coupled loop, 3 axes", "ns/step"
     yield Row(stage, Kind.SPEED_UP, 100.0, "pure Python", unit, ours * 1e9, peer * 1e9)
     yield from parallel_rows()
-    yield not_built("observer and adaptation", Kind.SHARE, 2.0, "compiled prototype (recorded)")
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ SCRIPTS = (
     "shaping",
     "live_shaping",
     "servo_loop",
+    "servo_drive",
     "contour_error",
     "whole_chain",
     "real_programs",

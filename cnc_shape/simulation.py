@@ -20,7 +20,8 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.commanding import resting, tell
 from cnc_shape.controllers import Control, Estimator
-from cnc_shape.controllers.loop import SIGNALS, Command, Poses
+from cnc_shape.controllers.loop import Command, Poses
+from cnc_shape.controllers.motor_loop import SIGNALS
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics

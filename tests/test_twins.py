@@ -13,10 +13,15 @@ KERNEL = re.compile(r"^@kernel\ndef (\w+)", re.MULTILINE)
 # one another; those that are called from outside are compared, and the rest with them.
 TWINS = {
     "controllers/cross_coupling.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/disturbance_observer.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/estimators.py": ("naive.servo_loop", "test_loop.py"),
     "controllers/feedforward.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/friction_feedforward.py": ("naive_servo.run", "test_inertia_compensation.py"),
+    "controllers/inertia_compensation.py": ("naive_servo.run", "test_inertia_compensation.py"),
+    "controllers/inertia_identification.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/loop.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/position_loop.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/servo_drive.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "kernels/arcs.py": ("naive.contour_distance", "test_contour.py"),
     "kernels/cells.py": ("naive.hat_path", "test_smoothing.py"),
     "kernels/chords.py": ("naive.chords", "test_polyline.py"),

@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.arrays import FloatArray
 from cnc_shape.controllers.compensation import DisturbanceObserver
 from cnc_shape.kernels import kernel
 
 ANGLE, SPEED, LOAD = 0, 1, 2  # columns of an observer's memory: its estimates, rad, rad/s, N m
-GIVEN = 3  # the torque given, behind the same poles as the estimate: after one, two and all three of them
+ONCE, TWICE, THRICE = 3, 4, 5  # the torque given behind the same poles as the estimate: one, two, all three
 COLUMNS = 6
 
 
@@ -29,22 +29,19 @@ class ObserverGains(NamedTuple):
     feedforward: float  # -, share of the estimate that is added to the torque
     angle: float  # -, correction of the angle per rad of surprise
     speed: float  # 1/s
-    load: FloatArray  # (j,) N m/rad
+    load: float  # 1/s^2, times the believed inertia N m/rad
     pole: float  # -
 
 
-def gains(observer: DisturbanceObserver | None, believed: FloatArray, period: float) -> ObserverGains:
-    """Gains that put all poles at ``exp(-bandwidth period)`` (spec: inertia compensation, section 3.3).
-
-    believed (j,) kg m^2; period s.
-    """
+def gains(observer: DisturbanceObserver | None, period: float) -> ObserverGains:
+    """Gains that put all poles at ``exp(-bandwidth period)``, period s (spec: section 3.3)."""
     if observer is None:
-        return ObserverGains(0, 0.0, 0.0, 0.0, frozen(np.zeros(believed.size)), 0.0)
+        return ObserverGains(0, 0.0, 0.0, 0.0, 0.0, 0.0)
     pole = exp(-observer.bandwidth * period)
     d = 1.0 - pole
     return ObserverGains(
         1, observer.feedforward, 3.0 * d, (3.0 * d**2 - 0.5 * d**3) / period,
-        frozen(-believed * d**3 / period**2), pole,
+        -(d**3) / period**2, pole,
     )  # fmt: skip
 
 
@@ -56,21 +53,21 @@ def start(reading: FloatArray) -> FloatArray:
 
 
 @kernel
-def step(gains, motors, j, torque, reading, memory):
-    """Take a reading (rad), and predict the next tick under a torque (N m). memory (j,6)."""
-    period, believed = motors.period, motors.believed[j]
-    surprise = reading - memory[j, ANGLE]
-    driven = period / believed * (torque - memory[j, LOAD])
-    memory[j, ANGLE] += period * (memory[j, SPEED] + 0.5 * driven) + gains.angle * surprise
-    memory[j, SPEED] += driven + gains.speed * surprise
-    memory[j, LOAD] += gains.load[j] * surprise
-    passing = torque
-    for i in range(GIVEN, COLUMNS):
-        memory[j, i] += (1.0 - gains.pole) * (passing - memory[j, i])
-        passing = memory[j, i]
+def predicted(gains, period, believed, push, torque, reading, angle, speed, load):
+    """Angle, speed and load expected at the next tick, after a reading (rad) and under a torque (N m).
+
+    believed kg m^2; push: speed per torque held for a tick that it makes, rad/s per N m.
+    """
+    surprise = reading - angle
+    driven = push * (torque - load)
+    return (
+        angle + period * (speed + 0.5 * driven) + gains.angle * surprise,
+        speed + driven + gains.speed * surprise,
+        load + believed * gains.load * surprise,
+    )
 
 
 @kernel
-def acceleration(motors, j, memory):
-    """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2."""
-    return (memory[j, COLUMNS - 1] - memory[j, LOAD]) / motors.believed[j]
+def acceleration(believed, j, memory):
+    """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2; believed kg m^2."""
+    return (memory[j, THRICE] - memory[j, LOAD]) / believed

@@ -1,5 +1,5 @@
 # pyright: basic
-"""Servo drive: encoder, velocity loop and motor, at a tick of their own within every sample of the loop.
+"""Servo drive: encoder, velocity loop and motor, a tick of the velocity loop at a time.
 
 One tick: the encoder is read; the velocity loop asks for a torque; the observer takes the reading; the motor
 moves on with the torque of the tick before: computing takes a tick (spec: inertia compensation, 3.1).
@@ -21,13 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.controllers import disturbance_observer as watching
-from cnc_shape.controllers import friction_feedforward as friction
-from cnc_shape.controllers import inertia_compensation as compensation
-from cnc_shape.controllers import inertia_identification as identification
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.noise import normal
-from cnc_shape.kernels.structure import swung
 from cnc_shape.machine import Axis, ServoMotor
 from cnc_shape.units import TWO_PI
 
@@ -38,23 +33,22 @@ READ, BEFORE = 6, 7  # the encoder now and the tick before, rad
 COLUMNS = 8
 
 
+PITCH = 0  # columns of the numbers of a motor: mm or rad of the joint per rad of the motor
+COUNT = 1  # rad, of the encoder; 0: it is exact
+TRUE_INERTIA, VISCOUS, COULOMB, LIMIT = 2, 3, 4, 5  # kg m^2, N m s, N m, N m
+LAG, DECAY = 6, 7  # what is left of a torque error, in the mean over a tick, and at its end
+BELIEVED = 8  # kg m^2, inertia that the controllers take it for
+GAIN, GROWTH = 9, 10  # N m s, velocity gain at a gain ratio of 1; tick over integral time
+NUMBERS = 11
+
+
 class Motors(NamedTuple):
-    """Servo motors and their velocity loops: a row for every joint, also those that have none."""
+    """Servo motors and their velocity loops."""
 
     servo: IntArray  # (j,) 1: the joint has a servo motor
     ticks: int  # of the velocity loop in a sample
     period: float  # s, of a tick
-    pitch: FloatArray  # (j,) mm or rad of the joint per rad of the motor
-    count: FloatArray  # (j,) rad, of the encoder; 0: it is exact
-    inertia: FloatArray  # (j,) kg m^2
-    viscous: FloatArray  # (j,) N m s
-    coulomb: FloatArray  # (j,) N m
-    limit: FloatArray  # (j,) N m
-    lag: FloatArray  # (j,) mean over a tick of what is left of a torque error
-    decay: FloatArray  # (j,) what is left of it at the end
-    believed: FloatArray  # (j,) kg m^2
-    proportional: FloatArray  # (j,) N m s, velocity gain at a gain ratio of 1
-    integral: FloatArray  # (j,) tick over integral time
+    numbers: FloatArray  # (j,11), a row for every joint, also for one without a motor
     noise: float  # counts, standard deviation of a reading
     seed: int
 
@@ -70,11 +64,7 @@ def motors(joints: Sequence[Axis], sample_time: float, noise: float = 0.0, seed:
     period, ticks = velocity_ticks(joints, sample_time)
     rows = np.array([_row(joint, period) for joint in joints])
     servo = frozen_integers([isinstance(joint.drive, ServoMotor) for joint in joints])
-    pitch, count, inertia, viscous, coulomb, limit, lag, decay, believed, gain, integral = map(frozen, rows.T)
-    return Motors(
-        servo, ticks, period, pitch, count, inertia, viscous, coulomb, limit, lag, decay, believed, gain,
-        integral, noise, seed,
-    )  # fmt: skip
+    return Motors(servo, ticks, period, frozen(rows), noise, seed)
 
 
 def velocity_ticks(joints: Sequence[Axis], sample_time: float) -> tuple[float, int]:
@@ -96,10 +86,10 @@ def velocity_ticks(joints: Sequence[Axis], sample_time: float) -> tuple[float, i
 
 
 def _row(joint: Axis, period: float) -> tuple[float, ...]:
-    """Pitch and what follows it in `Motors`, up to the integral; a joint without motor turns as it moves."""
+    """The numbers of a motor; a joint without one turns as it moves."""
     drive = joint.drive
     if not isinstance(drive, ServoMotor):
-        return (1.0, *(0.0,) * 10)
+        return (1.0, *(0.0,) * (NUMBERS - 1))
     loop, lag = drive.velocity_loop, drive.current_time_constant
     decay = exp(-period / lag) if lag > 0.0 else 0.0
     count = TWO_PI / drive.encoder_counts if drive.encoder_counts else 0.0
@@ -113,102 +103,59 @@ def _row(joint: Axis, period: float) -> tuple[float, ...]:
 def start(motors: Motors, reference: FloatArray) -> FloatArray:
     """Memory of motors at rest where their joints are at `reference` (j,) mm or rad, (j,8)."""
     memory = np.zeros((reference.size, COLUMNS))
-    memory[:, ANGLE] = memory[:, READ] = reference / motors.pitch
-    fine = motors.count > 0.0
-    counts = np.floor(memory[fine, ANGLE] / motors.count[fine] + 0.5)
-    memory[fine, READ] = counts * motors.count[fine]
+    memory[:, ANGLE] = memory[:, READ] = reference / motors.numbers[:, PITCH]
+    count = motors.numbers[:, COUNT]
+    fine = count > 0.0
+    memory[fine, READ] = np.floor(memory[fine, ANGLE] / count[fine] + 0.5) * count[fine]
     memory[:, BEFORE] = memory[:, READ]
     return memory
 
 
 @kernel
+def reading(angle, count, noise, seed, joint, tick):
+    """What an encoder reads at an angle (rad), rad.
+
+    count rad; noise: standard deviation in counts; seed, joint, tick: of its place among all readings.
+    """
+    if count <= 0.0:
+        return angle
+    counts = angle / count
+    if noise > 0.0:
+        counts += noise * normal(seed, joint, tick)
+    return np.floor(counts + 0.5) * count
+
+
+@kernel
 def measure(motors, j, tick, memory):
-    """Read the encoder of joint j; tick: number of the reading, for its noise. memory (j,8)."""
-    angle = memory[j, ANGLE]
-    count = motors.count[j]
+    """Read the encoder of joint j at a sample. memory (j,8)."""
     memory[j, BEFORE] = memory[j, READ]
-    if count > 0.0:
-        reading = angle / count
-        if motors.noise > 0.0:
-            reading += motors.noise * normal(motors.seed, j, tick)
-        angle = np.floor(reading + 0.5) * count
-    memory[j, READ] = angle
+    count = motors.numbers[j, COUNT]
+    memory[j, READ] = reading(memory[j, ANGLE], count, motors.noise, motors.seed, j, tick)
 
 
 @kernel
-def velocity_step(motors, j, command, ratio, stiffening, fed, memory):
-    """Torque that the velocity loop of joint j asks for, N m.
+def velocity_step(error, gain, growth, fed, limit, integral):
+    """Torque that a velocity loop asks for, and its integral, N m.
 
-    command rad/s; ratio: of the gain to its nominal one; stiffening: factor of the integral; fed N m: torque
-    fed forward; memory (j,8).
+    error rad/s; gain N m s; growth: of the integral in a tick, by gain and error; fed N m: torque fed
+    forward; limit N m.
     """
-    error = command - (memory[j, READ] - memory[j, BEFORE]) / motors.period
-    gain = motors.proportional[j] * ratio
-    step = gain * motors.integral[j] * stiffening * error
-    asked = gain * error + (memory[j, INTEGRAL] + step) + fed
-    limit = motors.limit[j]
+    step = gain * growth * error
+    asked = gain * error + (integral + step) + fed
     if abs(asked) <= limit or asked * error < 0.0:  # else the integral would wind up
-        memory[j, INTEGRAL] += step
-    return min(max(asked, -limit), limit)
+        integral += step
+    return min(max(asked, -limit), limit), integral
 
 
 @kernel
-def motor_step(motors, j, load, memory):
-    """Move the motor of joint j on by a tick under the torque of the tick before; load N m, memory (j,8)."""
-    asked, torque, speed = memory[j, ASKED], memory[j, TORQUE], memory[j, SPEED]
-    period, inertia = motors.period, motors.inertia[j]
-    mean = asked + (torque - asked) * motors.lag[j]
-    memory[j, TORQUE] = asked + (torque - asked) * motors.decay[j]
-    free = (speed + period * (mean - load) / inertia) / (1.0 + period * motors.viscous[j] / inertia)
-    slowed = abs(free) - period * motors.coulomb[j] / inertia
-    after = copysign(slowed, free) if slowed > 0.0 else 0.0
-    memory[j, ANGLE] += 0.5 * period * (speed + after)
-    memory[j, SPEED] = after
+def motor_step(period, push, drag, rub, lag, decay, asked, load, angle, speed, torque):
+    """Angle, speed and torque of a motor a tick later, under the torque asked for the tick before.
 
-
-@kernel
-def sample_step(
-    motors, j, tick, command, fed, friction_gains, observer, compensate, identify, load, k, state, states,
-    transition, held, varying, position, memory,
-):  # fmt: skip
-    """Run the ticks of joint j until the next sample.
-
-    tick: number of the first of them; command rad/s and fed N m are held; load (n,ticks,joints) N m, or
-    without rows, of which row k is meant; state (j,s): position, velocity and modes of the joints; transition
-    (j,s,s), held (j,s): of the modes over a tick; varying: a `Varying`, position (j,): of all joints at the
-    sample, for modes with tables; memory: a `MotorMemory`.
+    push: speed per torque held for a tick, rad/s per N m; drag: factor by which viscous friction slows;
+    rub rad/s: what Coulomb friction takes of the speed; lag, decay: of the current; load N m.
     """
-    pitch = motors.pitch[j]
-    motor, watched, compensated = memory.motor, memory.observer, memory.compensation
-    rubbing = friction.torque(friction_gains, j, memory.friction)
-    for i in range(motors.ticks):
-        if i > 0:
-            measure(motors, j, tick + i, motor)
-        estimate = watched[j, watching.LOAD]
-        ratio = compensated[j, compensation.RATIO]
-        stiffening = ratio if compensate.scales_integral else 1.0
-        asked = velocity_step(
-            motors, j, command, ratio, stiffening, fed + rubbing + observer.feedforward * estimate, motor
-        )
-        if observer.watches:
-            applied = motor[j, ASKED] - motor[j, FRICTION]
-            if compensate.models:
-                compensation.displace(compensate, motors, observer, j, estimate, compensated)
-            if identify.acts:
-                identification.follow(observer, j, watched[j, watching.SPEED], memory.identification)
-            watching.step(observer, motors, j, applied, motor[j, READ], watched)
-        before = motor[j, SPEED]
-        motor_step(motors, j, load[k, i, j] if load.shape[0] > 0 else 0.0, motor)
-        motor[j, ASKED], motor[j, FRICTION] = asked, rubbing
-        acceleration = pitch * (motor[j, SPEED] - before) / motors.period
-        for m in range(2, states, 2):
-            d, w = state[j, m], state[j, m + 1]
-            if varying.rows[j, m // 2 - 1, 1] > 0:
-                state[j, m], state[j, m + 1] = swung(
-                    varying, j, m // 2 - 1, position, d, w, acceleration, 0.0, 0.0, motors.period
-                )
-                continue
-            for r in range(m, m + 2):
-                free = transition[j, r, m] * d + transition[j, r, m + 1] * w
-                state[j, r] = held[j, r] * acceleration + free
-    state[j, 0], state[j, 1] = pitch * motor[j, ANGLE], pitch * motor[j, SPEED]
+    mean = asked + (torque - asked) * lag
+    free = (speed + push * (mean - load)) * drag
+    slowed = abs(free) - rub
+    after = copysign(slowed, free) if slowed > 0.0 else 0.0
+    return angle + 0.5 * period * (speed + after), after, asked + (torque - asked) * decay
