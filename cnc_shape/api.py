@@ -16,6 +16,7 @@ from cnc_shape.readers.source import STANDARD_INPUT
 from cnc_shape.report import folder as run_folder
 from cnc_shape.report.figures import path_figure
 from cnc_shape.report.style import Format
+from cnc_shape.report.words import saturations
 from cnc_shape.slowing import slow_down
 
 if TYPE_CHECKING:
@@ -81,7 +82,8 @@ def report_context(
 
 def write_report(run: Run, folder: str | Path, setup: Setup, *, force: bool = False) -> Path:
     """Write the run folder of a recorded run; returns the path of its page."""
-    return run_folder.write_report(run, Path(folder), report_context([], setup), force=force)
+    context = report_context([], setup, warnings=saturations(run.summary))
+    return run_folder.write_report(run, Path(folder), context, force=force)
 
 
 def plot(run: Run) -> Figure:

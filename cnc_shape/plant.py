@@ -16,6 +16,11 @@ phi_0 = exp x, phi_k = (phi_{k-1} - 1/(k-1)!) / x,
 
     q+  = q + T phi_1 q' + b T (phi_2 u + phi_3 (u_end - u))         b = gain T / time_constant, or T
     q'+ =     phi_0 q' + b   (phi_1 u + phi_2 (u_end - u))
+
+A mode with a table leaves these matrices aside: its frequency and damping are those of where the table's
+axis stands when the sample begins, and `kernels.structure.swing` moves it. The drive's acceleration, which
+pushes it, is known within the sample: linear for an ideal drive, and for one with a lag
+``(gain u - q') / time_constant e^{-t / time_constant}``.
 """
 
 from __future__ import annotations
@@ -28,7 +33,9 @@ import numpy as np
 from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
+from cnc_shape.kernels.structure import Varying
 from cnc_shape.machine import Axis, Drive, FirstOrderLag, IdealDrive, ServoMotor
+from cnc_shape.units import TWO_PI
 
 PHI_TERMS = 18  # of the series of phi_3, whose rest at |x| <= 1 is below 1/21!
 
@@ -41,6 +48,7 @@ class Plant(NamedTuple):
     rising: FloatArray  # (d,s) answer to an input that grows linearly by 1 over the sample
     states: IntArray  # (d,) states in use
     ideal: IntArray  # (d,) 1: the drive is where it is told to be
+    varying: Varying
 
 
 def continuous(axis: Axis) -> tuple[FloatArray, FloatArray]:
@@ -81,6 +89,36 @@ def discretise(axes: Sequence[Axis], sample_time: float, velocity_tick: float | 
         frozen(rising),
         frozen_integers([2 + 2 * len(axis.modes) for axis in axes]),
         frozen_integers([isinstance(axis.drive, IdealDrive) for axis in axes]),
+        vary(axes),
+    )
+
+
+def vary(axes: Sequence[Axis]) -> Varying:
+    """Lay the tables of all modes out; an axis that is not one of `axes` stands at 0."""
+    names = [axis.name for axis in axes]
+    most = max(len(axis.modes) for axis in axes)
+    rows, watched = np.zeros((len(axes), most, 2), np.int64), np.full((len(axes), most), -1)
+    participation, tables = np.zeros((len(axes), most)), [np.zeros((0, 3))]
+    laid = 0
+    for j, axis in enumerate(axes):
+        for k, mode in enumerate(axis.modes):
+            participation[j, k] = mode.participation
+            if (table := mode.table) is None:
+                continue
+            omega = TWO_PI * np.array(table.natural_frequency)
+            tables.append(np.column_stack([table.position, omega, table.damping_ratio]))
+            rows[j, k] = laid, laid + len(table.position)
+            laid += len(table.position)
+            if table.axis in names:
+                watched[j, k] = names.index(table.axis)
+    lags = [axis.drive if isinstance(axis.drive, FirstOrderLag) else None for axis in axes]
+    return Varying(
+        frozen(np.vstack(tables)),
+        frozen_integers(rows),
+        frozen_integers(watched),
+        frozen(participation),
+        frozen([0.0 if lag is None else 1.0 / lag.time_constant for lag in lags]),
+        frozen([0.0 if lag is None else lag.gain for lag in lags]),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.controllers.loop import SIGNALS
+from cnc_shape.controllers.motor_loop import SIGNALS
 from cnc_shape.joints import Joints
 from cnc_shape.machine import ServoMotor
 from cnc_shape.servo import Ticks

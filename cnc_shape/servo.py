@@ -20,7 +20,8 @@ from cnc_shape.controllers import (
     position_loop,
     servo_drive,
 )
-from cnc_shape.controllers.loop import Command, Memory, MotorMemory, Poses, Terms, servo_loop
+from cnc_shape.controllers.loop import Command, Memory, Poses, Terms, servo_loop
+from cnc_shape.controllers.motor_loop import MotorMemory
 from cnc_shape.disturbances import EncoderNoise
 from cnc_shape.joints import Joints, joints_of
 from cnc_shape.kernels.foot_point import PathTable
@@ -144,7 +145,7 @@ def make_loop(joints: Joints, control: Control, noise: EncoderNoise | None = Non
         int(control.cross_coupling is not None),
         cross_coupling.gains(control.cross_coupling),
         friction_feedforward.gains(control.friction_feedforward, drives, lags, period),
-        disturbance_observer.gains(observer_of(control), motors.believed, motors.period),
+        disturbance_observer.gains(observer_of(control), motors.period),
         inertia_compensation.gains(control.inertia_compensation, drives, gains, period),
         inertia_identification.gains(control.inertia_identification, period),
     )

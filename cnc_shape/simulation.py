@@ -20,7 +20,8 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.commanding import resting, tell
 from cnc_shape.controllers import Control, Estimator
-from cnc_shape.controllers.loop import SIGNALS, Command, Poses
+from cnc_shape.controllers.loop import Command, Poses
+from cnc_shape.controllers.motor_loop import SIGNALS
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.joints import CARTESIAN, Joints, joints_of
 from cnc_shape.kinematics import Kinematics
@@ -290,6 +291,6 @@ class _Stage:
 
 
 def _residual_ticks(machine: Machine, control: Control) -> int:
-    periods = [mode.damped_period for axis in machine.axes for mode in axis.modes]
+    periods = [mode.longest_period for axis in machine.axes for mode in axis.modes]
     watched = max(RESIDUAL_PERIODS * max(periods, default=0.0), SHORTEST_RESIDUAL_TIME)
     return int(np.ceil(watched / control.sample_time))

@@ -167,7 +167,7 @@ def _gentler(
     from scipy.ndimage import minimum_filter1d  # pyright: ignore[reportUnknownVariableType]
 
     period = setup.control.sample_time
-    slowest = max((m.damped_period for axis in setup.machine.axes for m in axis.modes), default=0.0)
+    slowest = max((m.longest_period for axis in setup.machine.axes for m in axis.modes), default=0.0)
     lag = 0.0 if trace.axes == () else shaping.lag(trace.axes, period)
     half = shaping.longer(trace.axes, period) / 2.0
     place = trace.place()

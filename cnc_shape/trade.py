@@ -70,7 +70,7 @@ def off_by(machine: Machine, model: Model) -> Machine:
 
     def moved(axis: Axis) -> Axis:
         factor = model.factors.get(axis.name, 1.0)
-        modes = tuple(replace(m, natural_frequency=m.natural_frequency * factor) for m in axis.modes)
+        modes = tuple(mode.scaled(factor) for mode in axis.modes)
         return replace(axis, modes=modes)
 
     return replace(machine, axes=tuple(moved(axis) for axis in machine.axes))

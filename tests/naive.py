@@ -789,6 +789,46 @@ def chord_errors(position, per_chord):
     return np.array(errors)
 
 
+# --- modes over position ----------------------------------------------------------------------------
+
+
+def vibration_over_position(axes, joint, rate, told, sample_time):
+    """Deflection of every axis, (n,j): one matrix exponential a sample, mode and axis.
+
+    joint, rate (n+1,j): position and velocity of the drives at the samples; told (n,j): what those with a lag
+    were told. Those without one run along the cubic through both samples.
+    """
+    from scipy.linalg import expm
+
+    names, T = [axis.name for axis in axes], sample_time
+    bent = np.zeros((len(told), len(axes)))
+    for j, axis in enumerate(axes):
+        for mode in axis.modes:
+            state = np.zeros(2)
+            for k in range(len(told)):
+                bent[k, j] += state[0]
+                frequency, zeta, table = mode.natural_frequency, mode.damping_ratio, mode.table
+                if table:
+                    x = joint[k, names.index(table.axis)] if table.axis in names else 0.0
+                    frequency = np.interp(x, table.position, table.natural_frequency)
+                    zeta = np.interp(x, table.position, table.damping_ratio)
+                omega = 2.0 * np.pi * frequency
+                M = np.zeros((4, 4))  # deflection, its rate, the drive's acceleration, its slope
+                M[0, 1], M[1] = 1.0, [-(omega**2), -2.0 * zeta * omega, -mode.participation, 0.0]
+                if hasattr(axis.drive, "time_constant"):
+                    M[2, 2] = -1.0 / axis.drive.time_constant
+                    push = [(axis.drive.gain * told[k, j] - rate[k, j]) / axis.drive.time_constant, 0.0]
+                else:
+                    M[2, 3] = 1.0
+                    step, v0, v1 = joint[k + 1, j] - joint[k, j], rate[k, j], rate[k + 1, j]
+                    push = [
+                        6.0 * step / T**2 - (4.0 * v0 + 2.0 * v1) / T,
+                        6.0 * (v0 + v1) / T**2 - 12.0 * step / T**3,
+                    ]
+                state = (expm(M * T) @ [*state, *push])[:2]
+    return bent
+
+
 # --- disturbances -------------------------------------------------------------------------------------
 
 

@@ -9,7 +9,7 @@ motor under the torque that was computed a tick before.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import exp, floor, pi
+from math import exp, floor, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,9 @@ EFFECTIVE_INERTIA, LITERAL, LITERAL_INVERSE, FIXED, TRIGGERED = range(5)
 EXACT_AGREEMENT = 1e-7  # mm^2, sum of squares of the displacement from which the agreement is fitted
 LEAST_GAIN = 0.1  # -, of the nominal velocity gain, that a literal reading may leave
 LEAST_PULL = 1e-9  # rad/s, below which the literal inverse has nothing to divide by
-COVARIANCE_START, COVARIANCE_CAP = 100.0, 1e4  # of the least squares, whose unknowns are about 1
+STANDSTILL = 1e-3  # rad/s, below which friction has no direction
+SCALE = 200.0  # rad/s^2, of the acceleration among the regressors
+COVARIANCE_START, COVARIANCE_CAP = 100.0, 1e4  # of the least squares
 
 
 class Settings(NamedTuple):
@@ -125,7 +127,7 @@ def run(
     effective, agreement = np.zeros(d), np.ones(d)
     lagged, friction, forward = np.zeros(d), np.zeros(d), np.zeros(d)
     excited = np.zeros(d)  # (rad/s^2)^2
-    unknown = np.zeros((d, 3))  # inertia beyond the nominal one over that, Coulomb friction, constant load
+    unknown = np.zeros((d, 3))  # N m: SCALE times what the inertia has above the nominal one; Coulomb; T0
     covariance = np.zeros((d, 3, 3))
     for i in range(d):
         for j in range(3):
@@ -147,12 +149,13 @@ def run(
         if k % s.ticks == 0:
             row = k // s.ticks
             foot = nearest(y * pitch)
+            yielding = pitch * sqrt((pushed * pushed).sum())  # mm, of all axes together
             for i in range(d):
                 error = reference[row, i] / pitch - y[i]
                 command[i] = s.position_gain * error + s.velocity_share * velocity[row, i] / pitch
                 forward[i] = s.acceleration_share * s.nominal * acceleration[row, i] / pitch
                 lagged[i] += lagging * (velocity[row, i] / pitch - lagged[i])
-                direction = 1.0 if lagged[i] > 0.0 else -1.0 if lagged[i] < 0.0 else 0.0
+                direction = 1.0 if lagged[i] > STANDSTILL else -1.0 if lagged[i] < -STANDSTILL else 0.0
                 friction[i] = s.friction_coulomb * direction + s.friction_viscous * lagged[i]
 
                 accelerated = (filtered[i, 2] - seen_load[i]) / s.nominal
@@ -172,7 +175,7 @@ def run(
                         wanted = 1.0 + share * effective[i] / s.nominal
                         wanted = min(max(wanted, 1.0), s.largest)
                     elif s.law == TRIGGERED:
-                        wanted = s.largest if abs(displaced) > s.threshold else 1.0
+                        wanted = 1.0 + (s.largest - 1.0) * min(yielding / s.threshold, 1.0)
                     elif s.law == FIXED:
                         wanted = s.largest
                     else:
@@ -188,7 +191,7 @@ def run(
                     keep = exp(-sample / s.identification_time)
                     excited[i] = keep * excited[i] + (1.0 - keep) * accelerated**2
                     if excited[i] > s.excitation**2:
-                        regressor = np.array([s.nominal * accelerated, signs[i, 2], 1.0])
+                        regressor = np.array([accelerated / SCALE, signs[i, 2], 1.0])
                         spread = covariance[i] @ regressor
                         power = keep + regressor @ spread
                         unknown[i] += spread / power * (seen_load[i] - regressor @ unknown[i])
@@ -196,7 +199,8 @@ def run(
                         trace = covariance[i, 0, 0] + covariance[i, 1, 1] + covariance[i, 2, 2]
                         if trace > COVARIANCE_CAP:
                             covariance[i] *= COVARIANCE_CAP / trace
-                        inertia[i] = s.nominal * min(max(1.0 + unknown[i, 0], 0.3), 5.0)
+                        found = 1.0 + unknown[i, 0] / SCALE / s.nominal
+                        inertia[i] = s.nominal * min(max(found, 0.3), 5.0)
 
                 told.position[row, i] = pitch * theta[i]
                 told.torque[row, i] = applied[i]
@@ -214,16 +218,13 @@ def run(
             before[i] = y[i]
             lacking = command[i] - measured
             grown = integral[i] + gain * (h / time) * lacking
-            told_load = s.observer_share * seen_load[i]
-            torque = gain * lacking + grown + told_load + friction[i] + forward[i]
+            torque = gain * lacking + grown + s.observer_share * seen_load[i] + friction[i] + forward[i]
             limited = min(max(torque, -s.torque_limit), s.torque_limit)
-            if limited == torque or (torque - limited) * lacking <= 0.0:
+            if limited == torque or (torque - limited) * lacking < 0.0:
                 integral[i] = grown
-            else:
-                torque = gain * lacking + integral[i] + told_load + friction[i] + forward[i]
-                limited = min(max(torque, -s.torque_limit), s.torque_limit)
 
             push = applied[i] - friction_applied[i]  # in force until the next tick
+            sign = 1.0 if seen_speed[i] > 0.0 else -1.0 if seen_speed[i] < 0.0 else 0.0
             new = y[i] - seen[i]
             seen[i] += h * seen_speed[i] + h**2 / (2.0 * s.nominal) * (push - seen_load[i]) + l1 * new
             lack = -s.position_gain * pushed[i] - pushed_speed[i]
@@ -234,7 +235,6 @@ def run(
             pushed[i] += h * pushed_speed[i]
             seen_speed[i] += (h / s.nominal) * (push - seen_load[i]) + l2 * new
             seen_load[i] += l3 * new
-            sign = 1.0 if measured > 0.0 else -1.0 if measured < 0.0 else 0.0
             through, turned = push, sign
             for j in range(3):
                 filtered[i, j] += away * (through - filtered[i, j])

@@ -13,10 +13,15 @@ KERNEL = re.compile(r"^@kernel\ndef (\w+)", re.MULTILINE)
 # one another; those that are called from outside are compared, and the rest with them.
 TWINS = {
     "controllers/cross_coupling.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/disturbance_observer.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/estimators.py": ("naive.servo_loop", "test_loop.py"),
     "controllers/feedforward.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/friction_feedforward.py": ("naive_servo.run", "test_inertia_compensation.py"),
+    "controllers/inertia_compensation.py": ("naive_servo.run", "test_inertia_compensation.py"),
+    "controllers/inertia_identification.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/loop.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/position_loop.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/servo_drive.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "kernels/arcs.py": ("naive.contour_distance", "test_contour.py"),
     "kernels/cells.py": ("naive.hat_path", "test_smoothing.py"),
     "kernels/chords.py": ("naive.chords", "test_polyline.py"),
@@ -41,6 +46,7 @@ TWINS = {
     "kernels/ring.py": ("naive.filtered", "test_live.py"),
     "kernels/sampling.py": ("naive.samples", "test_trajectory.py"),
     "kernels/speed_limits.py": ("naive.speed_limits", "test_feedrate.py"),
+    "kernels/structure.py": ("naive.vibration_over_position", "test_position_modes.py"),
     "kernels/sums.py": ("naive.squares", "test_sums.py"),
     "kernels/taps.py": ("naive.delayed_sum", "test_shaping.py"),
     "kernels/time_law.py": ("naive.fastest", "test_feedrate.py"),

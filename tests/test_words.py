@@ -69,11 +69,13 @@ def test_where_rows_are_disturbed_the_best_of_them_is_told_against_the_first_of_
 def test_a_motor_at_its_limit_is_a_warning_with_joint_case_and_share():
     motors = tuple(
         MotorDuty(joint, 7.1, 1.0, 2.5, 1.0, share, 4.6e-4)
-        for joint, share in (("x", 0.0321), ("y", 0.01), ("z", 1.0))
+        for joint, share in (("x", 0.0101), ("y", 0.01), ("z", 1.0))
     )
     rows = (case("independent", 0.1, 0.1, 1.0), replace(case("loaded", 0.1, 0.1, 1.0), motors=motors))
     (told,) = saturations(summary(*rows))
-    assert told.startswith("loaded: torque at its limit, motor X for 3.21 %, motor Z for 100 % of the time")
+    assert told == (
+        "loaded: torque limit reached by motor X for 1.01 %, motor Z for 100 % of the time; the loop is open then"
+    )
 
 
 def test_the_worst_places_of_a_disturbed_case_are_told_against_the_first_disturbed_one():

@@ -67,7 +67,7 @@ def check(
     if not files or pose is not None:
         reason = "check needs a FILE" if not files else "--pose goes with --jacobian"
         raise OptionError(reason, hint="name programs, CSV or machine files; or -m MACHINE --jacobian")
-    tools = _tools(machine)
+    tools = _tools(machine, quiet=quiet)
     options = limited(
         named_options(dialect, path, tools, block_delete=block_delete, closed=closed),
         blocks=max_blocks,
@@ -97,12 +97,15 @@ def check(
     return status
 
 
-def _tools(machine: str | None) -> Any:
+def _tools(machine: str | None, *, quiet: bool) -> Any:
     if machine is None:
         return ()
+    from cnc_shape.cli.output import warn
     from cnc_shape.config.machine_file import load_machine
 
-    return load_machine(machine).tools
+    setup = load_machine(machine)
+    warn(setup.warnings, quiet=quiet)
+    return setup.tools
 
 
 def _one_target(files: list[str], points: str | None) -> None:
@@ -215,6 +218,7 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
             ("kinematics", result["kinematics"]),
             ("joints", joints),
             ("modes", modes or "none"),
+            *(("", f"{mode['axis'].upper()}: {mode['summary']}") for mode in result["position_modes"]),
             ("shapers", shapers or "none"),
             ("loop", _loop(result["loop"])),
             *([("motors", ", ".join(result["motor_terms"]))] if result["motor_terms"] else []),

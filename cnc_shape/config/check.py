@@ -8,6 +8,7 @@ from cnc_shape.config.complaints import locate
 from cnc_shape.config.control import MOTOR_TERMS
 from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.machine_file import read_content, read_machine
+from cnc_shape.config.position_notes import position_facts
 from cnc_shape.config.yaml_tree import refuse
 from cnc_shape.disturbances import (
     EncoderNoise,
@@ -51,6 +52,7 @@ def check_machine(path: Path | str) -> dict[str, object]:
         "joints": {drive.name: DRIVES[type(drive.drive)] for drive in joints.drives},
         "axes": [axis.name for axis in setup.machine.axes],
         "modes": {axis.name: len(axis.modes) for axis in setup.machine.axes},
+        "position_modes": position_facts(setup),
         "shapers": {
             name: {"type": setup.choices[name].type, "duration_s": shaper.duration, "delay_s": shaper.delay}
             for name, shaper in setup.shapers.items()

@@ -7,6 +7,7 @@ from math import isfinite
 import yaml
 
 from cnc_shape.config.dump_motors import compensation_keys, disturbance_list, motor_keys
+from cnc_shape.config.mode_tables import dump_mode_table
 from cnc_shape.config.setup import Planning, Setup
 from cnc_shape.config.spelling import to_degrees
 from cnc_shape.controllers import Control, CrossCoupling
@@ -127,6 +128,8 @@ def _mode(mode: Mode) -> dict[str, object]:
         keys["frequency_uncertainty"] = mode.frequency_uncertainty
     if mode.damping_uncertainty:
         keys["damping_uncertainty"] = mode.damping_uncertainty
+    if mode.table is not None:
+        keys["over_position"] = dump_mode_table(mode.table, to_degrees)
     return keys
 
 

@@ -16,6 +16,7 @@ from cnc_shape.config.control import read_control
 from cnc_shape.config.disturbances import read_disturbances
 from cnc_shape.config.drives import Drives, check_ticks, drive_of
 from cnc_shape.config.joints import AxisModels, read_joints, read_kinematics
+from cnc_shape.config.mode_tables import read_mode_table
 from cnc_shape.config.models import (
     AxesModel,
     LinearAxisModel,
@@ -24,13 +25,14 @@ from cnc_shape.config.models import (
     RotaryAxisModel,
 )
 from cnc_shape.config.planning import planning_of
-from cnc_shape.config.setup import Setup, ShaperChoice
+from cnc_shape.config.position_notes import position_notes
+from cnc_shape.config.setup import Setup, ShaperChoice, Shaping
 from cnc_shape.config.shaper_options import NONE, design, key_of
 from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refuse
 from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine
-from cnc_shape.modes import Mode
+from cnc_shape.modes import Mode, ModeTable
 from cnc_shape.program import Note
 from cnc_shape.shapers import SINGLE_MODE, Shaper
 from cnc_shape.tools import Tool
@@ -100,15 +102,22 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
         refuse(source, locate(tree, ("axes",))[0], "axes: a machine needs an axis", "add x: with its limits")
     check_ticks(source, tree, _drives(machine), model.control.sample_time_s)
     choices = {name: choice for name, axis in axes.items() if (choice := _choice(axis))}
-    notes = (*_jerk_note(tree, axes), *_single_mode_notes(tree, machine, choices))
+    planning = planning_of(source, tree, model.planning)
+    shapers = {name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()}
+    acting = {} if planning.shaping is Shaping.NONE else shapers
+    notes = (
+        *_jerk_note(tree, axes),
+        *_single_mode_notes(tree, machine, choices),
+        *position_notes(tree, machine, acting, choices),
+    )
     setup = Setup(
         machine=machine,
-        planning=planning_of(source, tree, model.planning),
+        planning=planning,
         control=read_control(source, tree, model.control, machine, kinematics),
         disturbances=read_disturbances(source, tree, model.disturbances, machine, kinematics),
         tools=_tools(source, tree, model),
         choices=choices,
-        shapers={name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()},
+        shapers=shapers,
         kinematics_choice=kind,
         kinematics=kinematics,
         loop_place=_loop_place(tree),
@@ -202,9 +211,17 @@ def _modes(source: str, tree: Tree, axis: str, models: list[ModeModel]) -> tuple
             share if model.participation is None else model.participation,
             model.frequency_uncertainty,
             model.damping_uncertainty,
+            _table(source, tree, axis, index, model),
         )
-        for model in models
+        for index, model in enumerate(models)
     )
+
+
+def _table(source: str, tree: Tree, axis: str, index: int, model: ModeModel) -> ModeTable | None:
+    if model.over_position is None:
+        return None
+    path = ("axes", axis, "modes", index, "over_position")
+    return read_mode_table(source, tree, path, model.over_position, axis, model.damping_ratio)
 
 
 def _choice(model: LinearAxisModel | RotaryAxisModel) -> ShaperChoice | None:

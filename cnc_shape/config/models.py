@@ -20,6 +20,7 @@ from cnc_shape.config.compensation_models import (
 from cnc_shape.config.disturbance_models import AnyDisturbance
 from cnc_shape.config.drive_models import AnyDrive
 from cnc_shape.config.kinematics import AnyKinematics
+from cnc_shape.config.mode_models import OverPositionModel
 from cnc_shape.config.shaper_options import AnyShaper
 from cnc_shape.config.strict import Strict
 
@@ -50,6 +51,7 @@ class ModeModel(Strict):
     participation: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     frequency_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     damping_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    over_position: OverPositionModel | None = None
 
 
 class _AxisModel(Strict):

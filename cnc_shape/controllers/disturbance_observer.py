@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cnc_shape.arrays import FloatArray, frozen
+from cnc_shape.arrays import FloatArray
 from cnc_shape.controllers.compensation import DisturbanceObserver
 from cnc_shape.kernels import kernel
 
@@ -29,22 +29,19 @@ class ObserverGains(NamedTuple):
     feedforward: float  # -, share of the estimate that is added to the torque
     angle: float  # -, correction of the angle per rad of surprise
     speed: float  # 1/s
-    load: FloatArray  # (j,) N m/rad
+    load: float  # 1/s^2, times the believed inertia N m/rad
     pole: float  # -
 
 
-def gains(observer: DisturbanceObserver | None, believed: FloatArray, period: float) -> ObserverGains:
-    """Gains that put all poles at ``exp(-bandwidth period)`` (spec: inertia compensation, section 3.3).
-
-    believed (j,) kg m^2; period s.
-    """
+def gains(observer: DisturbanceObserver | None, period: float) -> ObserverGains:
+    """Gains that put all poles at ``exp(-bandwidth period)``, period s (spec: section 3.3)."""
     if observer is None:
-        return ObserverGains(0, 0.0, 0.0, 0.0, frozen(np.zeros(believed.size)), 0.0)
+        return ObserverGains(0, 0.0, 0.0, 0.0, 0.0, 0.0)
     pole = exp(-observer.bandwidth * period)
     d = 1.0 - pole
     return ObserverGains(
         1, observer.feedforward, 3.0 * d, (3.0 * d**2 - 0.5 * d**3) / period,
-        frozen(-believed * d**3 / period**2), pole,
+        -(d**3) / period**2, pole,
     )  # fmt: skip
 
 
@@ -56,21 +53,21 @@ def start(reading: FloatArray) -> FloatArray:
 
 
 @kernel
-def predicted(gains, period, push, correction, torque, reading, angle, speed, load):
-    """Angle, speed and load that are expected at the next tick, after a reading (rad) and under a torque (N m).
+def predicted(gains, period, believed, push, torque, reading, angle, speed, load):
+    """Angle, speed and load expected at the next tick, after a reading (rad) and under a torque (N m).
 
-    push: believed speed per torque held for a tick, rad/s per N m; correction N m/rad: of the load.
+    believed kg m^2; push: speed per torque held for a tick that it makes, rad/s per N m.
     """
     surprise = reading - angle
     driven = push * (torque - load)
     return (
         angle + period * (speed + 0.5 * driven) + gains.angle * surprise,
         speed + driven + gains.speed * surprise,
-        load + correction * surprise,
+        load + believed * gains.load * surprise,
     )
 
 
 @kernel
-def acceleration(motors, j, memory):
-    """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2."""
-    return (memory[j, THRICE] - memory[j, LOAD]) / motors.believed[j]
+def acceleration(believed, j, memory):
+    """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2; believed kg m^2."""
+    return (memory[j, THRICE] - memory[j, LOAD]) / believed

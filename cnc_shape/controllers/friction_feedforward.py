@@ -16,6 +16,7 @@ from cnc_shape.controllers.compensation import FrictionFeedforward
 from cnc_shape.kernels import kernel
 from cnc_shape.machine import Axis, ServoMotor
 
+COULOMB, VISCOUS, DECAY = 0, 1, 2  # columns of the numbers
 STANDSTILL = 1e-3  # rad/s, speed below which there is no direction to push in
 
 
@@ -23,9 +24,7 @@ class FrictionGains(NamedTuple):
     """Friction of every motor that is fed forward."""
 
     acts: int
-    coulomb: FloatArray  # (j,) N m
-    viscous: FloatArray  # (j,) N m s
-    decay: FloatArray  # (j,) -, of the lag over a sample
+    numbers: FloatArray  # (j,3) Coulomb friction in N m, viscous in N m s, decay of the lag over a sample
 
 
 def gains(
@@ -33,19 +32,18 @@ def gains(
 ) -> FrictionGains:
     """Gains for joints whose motors are late by time constants `lags`, s."""
     shares = feedforward or FrictionFeedforward(0.0, 0.0)
-    drives = [joint.drive for joint in joints]
-    return FrictionGains(
-        int(feedforward is not None),
-        frozen([shares.coulomb * d.coulomb if isinstance(d, ServoMotor) else 0.0 for d in drives]),
-        frozen([shares.viscous * d.viscous if isinstance(d, ServoMotor) else 0.0 for d in drives]),
-        frozen([exp(-sample_time / lag) if lag > 0.0 else 0.0 for lag in lags]),
-    )
+    rows: list[tuple[float, float, float]] = []
+    for joint, lag in zip(joints, lags, strict=True):
+        drive, decay = joint.drive, exp(-sample_time / lag) if lag > 0.0 else 0.0
+        coulomb, viscous = (drive.coulomb, drive.viscous) if isinstance(drive, ServoMotor) else (0.0, 0.0)
+        rows.append((shares.coulomb * coulomb, shares.viscous * viscous, decay))
+    return FrictionGains(int(feedforward is not None), frozen(rows))
 
 
 @kernel
 def follow(gains, j, speed, memory):
     """Take the commanded speed of the coming sample, rad/s. memory (j,)."""
-    memory[j] = speed + (memory[j] - speed) * gains.decay[j]
+    memory[j] = speed + (memory[j] - speed) * gains.numbers[j, DECAY]
 
 
 @kernel
@@ -54,9 +52,9 @@ def torque(gains, j, memory):
     if not gains.acts:
         return 0.0
     speed = memory[j]
-    pushed = gains.viscous[j] * speed
+    pushed = gains.numbers[j, VISCOUS] * speed
     if speed > STANDSTILL:
-        pushed += gains.coulomb[j]
+        pushed += gains.numbers[j, COULOMB]
     elif speed < -STANDSTILL:
-        pushed -= gains.coulomb[j]
+        pushed -= gains.numbers[j, COULOMB]
     return pushed

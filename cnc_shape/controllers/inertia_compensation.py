@@ -16,7 +16,7 @@ The gain is 1 without load, to the bit. What is raised is stiffness: the true in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, sqrt
+from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -34,9 +34,10 @@ CROSS, SQUARE = 6, 7  # sums of displacement times contour error, and squared, m
 AGREEMENT = 8  # -A
 INERTIA = 9  # effective, above the believed one, kg m^2
 COLUMNS = 10
+DEADBAND, REGULARISATION, POSITION_GAIN = 0, 1, 2  # columns of the numbers
 ENOUGH = 1e-7  # mm^2, sum of squared displacements from which on agreement is told
 SMALLEST_RATIO = 0.1  # of the literal readings
-DEADBAND = 1.5  # of Coulomb friction
+ABOVE_FRICTION = 1.5  # deadband over Coulomb friction
 MILLISECOND = 1e-3  # s, for which forgetting is told
 LITERAL, LITERAL_INVERSE = GainLaw.LITERAL.value, GainLaw.LITERAL_INVERSE.value
 FIXED, TRIGGERED = GainLaw.FIXED.value, GainLaw.TRIGGERED.value
@@ -49,8 +50,7 @@ class CompensationGains(NamedTuple):
     models: int  # 1: the displacement under load is modelled
     law: int  # value of a `GainLaw`
     largest: float  # -
-    deadband: FloatArray  # (j,) N m
-    regularisation: FloatArray  # (j,) rad/s^2
+    numbers: FloatArray  # (j,3) deadband in N m, regularisation in rad/s^2, position gain in 1/s
     window: float  # -, share of what is new in a leaky window, a sample
     attack: float  # -, a sample
     release: float  # -, a sample
@@ -58,7 +58,6 @@ class CompensationGains(NamedTuple):
     scales_integral: int
     threshold: float  # mm
     slope: float  # rad/s per N m
-    position_gain: FloatArray  # (j,) 1/s
 
 
 def gains(
@@ -69,14 +68,16 @@ def gains(
 ) -> CompensationGains:
     """Gains for the motors of a machine's joints."""
     given = term or InertiaCompensation()
-    deadband = [_deadband(given, joint) for joint in joints]
+    rows: list[tuple[float, float, float]] = []
+    for joint, gain in zip(joints, position_gain, strict=True):
+        deadband = _deadband(given, joint)
+        rows.append((deadband, _regularisation(given, joint, deadband), gain))
     return CompensationGains(
         int(term is not None),
         int(term is not None and given.law is not GainLaw.FIXED),
         given.law.value,
         given.max_gain_ratio,
-        frozen(deadband),
-        frozen([_regularisation(given, joint, dead) for joint, dead in zip(joints, deadband, strict=True)]),
+        frozen(rows),
         _share(given.window, sample_time),
         _share(given.attack, sample_time),
         _share(given.release, sample_time),
@@ -84,7 +85,6 @@ def gains(
         int(given.scale_integral_time),
         given.threshold,
         given.torque_speed_slope,
-        frozen(position_gain),
     )
 
 
@@ -103,7 +103,7 @@ def _share(time_constant: float, sample_time: float) -> float:
 def _deadband(term: InertiaCompensation, joint: Axis) -> float:
     if term.deadband is not None:
         return term.deadband
-    return DEADBAND * joint.drive.coulomb if isinstance(joint.drive, ServoMotor) else 0.0
+    return ABOVE_FRICTION * joint.drive.coulomb if isinstance(joint.drive, ServoMotor) else 0.0
 
 
 def _regularisation(term: InertiaCompensation, joint: Axis, deadband: float) -> float:
@@ -116,7 +116,8 @@ def _regularisation(term: InertiaCompensation, joint: Axis, deadband: float) -> 
 def yielded(period, push, position_gain, gain, growth, load, angle, speed, holding):
     """Angle, speed and integral a tick later of a loop that yields to a load (N m), as the model has it.
 
-    push: believed speed per torque held for a tick, rad/s per N m; gain N m s and growth as of the velocity loop.
+    push: speed per torque held for a tick of the believed inertia, rad/s per N m; gain N m s and growth are
+    those of the velocity loop.
     """
     error = -position_gain * angle - speed
     holding += gain * growth * error
@@ -125,29 +126,17 @@ def yielded(period, push, position_gain, gain, growth, load, angle, speed, holdi
 
 
 @kernel
-def displacement(motors, memory):
-    """How far the joints yield to their loads by the model, as a vector's length, mm. memory (j,10)."""
-    square = 0.0
-    for j in range(motors.pitch.size):
-        if motors.servo[j]:
-            square += (motors.pitch[j] * memory[j, ANGLE]) ** 2
-    return sqrt(square)
-
-
-@kernel
-def step(gains, motors, j, deviation, known, yielding, watched, memory):
+def step(gains, j, believed, pitch, bandwidth, deviation, known, yielding, watched, memory):
     """Set the gain ratio of motor j for the coming sample.
 
-    deviation mm: where the joint is minus where the nearest point of the path would have it; known: 1 where
-    there is a path; yielding mm: how far all joints yield together; watched (j,6) of the observer; memory
-    (j,10).
+    believed kg m^2; pitch mm/rad; bandwidth 1/s: of the velocity loop; deviation mm: where the joint is
+    minus where the nearest point of the path would have it; known: 1 where there is a path; yielding mm: how
+    far all joints yield together; watched (j,6) of the observer; memory (j,10).
     """
-    believed = motors.believed[j]
-    load = watched[j, watching.LOAD]
-    acceleration = watching.acceleration(motors, j, watched)
+    load, acceleration = watched[j, watching.LOAD], watching.acceleration(believed, j, watched)
     memory[j, LOAD] += gains.window * (load - memory[j, LOAD])
     memory[j, ACCELERATION] += gains.window * (acceleration - memory[j, ACCELERATION])
-    moved = motors.pitch[j] * memory[j, ANGLE]
+    moved = pitch * memory[j, ANGLE]
     if known:
         memory[j, CROSS] = gains.forgetting * memory[j, CROSS] + moved * deviation
         memory[j, SQUARE] = gains.forgetting * memory[j, SQUARE] + moved * moved
@@ -156,11 +145,10 @@ def step(gains, motors, j, deviation, known, yielding, watched, memory):
         else:
             memory[j, AGREEMENT] = 1.0
     share = min(max(memory[j, AGREEMENT], 0.0), 1.0)
-    excess = max(abs(memory[j, LOAD]) - gains.deadband[j], 0.0)
-    pace = abs(memory[j, ACCELERATION]) + gains.regularisation[j]
+    excess = max(abs(memory[j, LOAD]) - gains.numbers[j, DEADBAND], 0.0)
+    pace = abs(memory[j, ACCELERATION]) + gains.numbers[j, REGULARISATION]
     inertia = excess / pace if excess > 0.0 else 0.0
     memory[j, INERTIA] = inertia
-    bandwidth = motors.proportional[j] / believed
     smallest = 1.0
     if gains.law == FIXED:
         wanted = gains.largest

@@ -71,9 +71,9 @@ def follow(observer, j, speed, memory):
 
 
 @kernel
-def step(gains, motors, j, watched, memory):
-    """Learn from a sample. watched (j,6) of the observer; memory (j,16)."""
-    acceleration = watching.acceleration(motors, j, watched)
+def step(gains, j, believed, watched, memory):
+    """Learn from a sample. believed kg m^2; watched (j,6) of the observer; memory (j,16)."""
+    acceleration = watching.acceleration(believed, j, watched)
     memory[j, EXCITATION] += gains.share * (acceleration * acceleration - memory[j, EXCITATION])
     if memory[j, EXCITATION] < gains.excitation_v2:
         return
@@ -97,8 +97,7 @@ def step(gains, motors, j, watched, memory):
 
 
 @kernel
-def inertia(gains, motors, j, memory):
+def inertia(gains, j, believed, memory):
     """Identified inertia of motor j, kg m^2."""
-    believed = motors.believed[j]
     found = believed + memory[j, PARAMETERS] / SCALE
     return min(max(found, gains.smallest * believed), gains.largest * believed)

@@ -27,10 +27,12 @@ from cnc_shape.controllers import (
     friction_feedforward,
     inertia_compensation,
     inertia_identification,
+    motor_loop,
     position_loop,
     servo_drive,
 )
-from cnc_shape.kernels import kernel
+from cnc_shape.controllers.motor_loop import SIGNALS, MotorMemory
+from cnc_shape.kernels import kernel, structure
 from cnc_shape.kernels.linear import solve
 
 FURTHEST = 1e4  # mm or rad, following error beyond which the loop has diverged
@@ -70,18 +72,6 @@ class Terms(NamedTuple):
     identification: inertia_identification.IdentificationGains
 
 
-class MotorMemory(NamedTuple):
-    """What servo motors and their controllers remember: a row for every joint."""
-
-    motor: FloatArray  # (j,8), columns of `servo_drive`
-    observer: FloatArray  # (j,6), columns of `disturbance_observer`
-    compensation: FloatArray  # (j,10), columns of `inertia_compensation`
-    identification: FloatArray  # (j,16), columns of `inertia_identification`
-    friction: FloatArray  # (j,) rad/s, lagged speed of the reference
-    late: FloatArray  # (delay,j) N m, torque fed forward that the drives have yet to hear, oldest first
-    clock: IntArray  # (1,) readings of the encoders so far
-
-
 class Memory(NamedTuple):
     """What the loop remembers from tick to tick; changed in place."""
 
@@ -91,10 +81,6 @@ class Memory(NamedTuple):
     coupling: FloatArray  # (3,3) of the cross-coupled controller
     cursor: IntArray  # (4,) of the search for foot points
     motors: MotorMemory
-
-
-TORQUE, LOAD, ESTIMATE, RATIO, EFFECTIVE, AGREEMENT, INERTIA = range(7)  # columns of the motors' signals
-SIGNALS = 7
 
 
 @kernel
@@ -109,7 +95,7 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
     """
     position, velocity, acceleration, reference, reference_velocity = command
     inverse, phase, every = poses
-    transition, held, rising, states, ideal = plant
+    transition, held, rising, states, ideal, varying = plant
     position_gains, feed, feed_gains, couple, couple_gains, friction, observer, compensate, identify = terms
     state, late, frame, coupling, cursor, turning = memory
     n, joints = reference.shape[0] - 1, reference.shape[1]
@@ -120,7 +106,8 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
     tool, drive = np.empty((n, joints)), np.empty((n, joints))
     mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints)
     following = np.zeros(max(joints, 3))
-    told, fed = np.empty(joints), np.zeros(joints)
+    told, fed, heard, helped = np.empty(joints), np.zeros(joints), np.empty(joints), np.empty(joints)
+    deviation, push = np.zeros(joints), np.zeros((motors.ticks, joints))
     servo = motors.servo.any()
     signals = np.zeros((n if servo else 0, joints, SIGNALS))
     tracking = following if cartesian else np.zeros(max(joints, 3))
@@ -143,7 +130,8 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                 return joint, rate, tool, drive, signals, k
             if motors.servo[j]:
                 servo_drive.measure(motors, j, turning.clock[0], turning.motor)
-                following[j] = reference[k, j] - motors.pitch[j] * turning.motor[j, servo_drive.READ]
+                read = motors.numbers[j, servo_drive.PITCH] * turning.motor[j, servo_drive.READ]
+                following[j] = reference[k, j] - read
             told[j] = 0.0
         position_loop.step(position_gains, following, told)
         if feed:
@@ -179,66 +167,61 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                         told[j] += inverse[row, j, i] * speed[i]
                     for i in range(3, solved):
                         told[j] += inverse[row, j, i] * couple_gains.orientation * tracking[i]
-        yielding = inertia_compensation.displacement(motors, turning.compensation) if compensate.acts else 0.0
         for j in range(joints):
             drive[k, j] = told[j]
+            heard[j], helped[j] = told[j], fed[j]
+            if late.shape[0] > 0:
+                heard[j], helped[j] = late[0, j], turning.late[0, j]
+                for i in range(late.shape[0] - 1):
+                    late[i, j], turning.late[i, j] = late[i + 1, j], turning.late[i + 1, j]
+                late[late.shape[0] - 1, j], turning.late[late.shape[0] - 1, j] = told[j], fed[j]
+        if servo:
+            for j in range(joints):
+                mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
+                deviation[j] = -foot[j] if cartesian and j < linear else 0.0
+                if known and j < solved:
+                    for i in range(3):
+                        deviation[j] -= inverse[row, j, i] * foot[i]
+            motor_loop.step(
+                k, heard, helped, mean_velocity, deviation, known, load, motors, friction, observer,
+                compensate, identify, turning, push, signals,
+            )  # fmt: skip
+        for j in range(joints):
             s = states[j]
+            if motors.servo[j]:
+                pitch = motors.numbers[j, servo_drive.PITCH]
+                state[j, 0] = pitch * turning.motor[j, servo_drive.ANGLE]
+                state[j, 1] = pitch * turning.motor[j, servo_drive.SPEED]
+                for t in range(motors.ticks):
+                    for i in range(2, s, 2):
+                        d, w = state[j, i], state[j, i + 1]
+                        if varying.rows[j, i // 2 - 1, 1] > 0:
+                            state[j, i], state[j, i + 1] = structure.swung(
+                                varying, j, i // 2 - 1, joint[k], d, w, push[t, j], 0.0, 0.0, motors.period
+                            )
+                            continue
+                        for r in range(i, i + 2):
+                            free = transition[j, r, i] * d + transition[j, r, i + 1] * w
+                            state[j, r] = held[j, r] * push[t, j] + free
+                continue
+            c0, c1 = heard[j], 0.0
             if ideal[j]:
                 # acceleration of the cubic through both samples: c0 at its start, c1 more at its end
                 step = reference[k + 1, j] - reference[k, j]
                 v0, v1 = reference_velocity[k, j], reference_velocity[k + 1, j]
                 c0 = (6.0 * step / sample_time - 4.0 * v0 - 2.0 * v1) / sample_time
                 c1 = (6.0 * v0 + 6.0 * v1 - 12.0 * step / sample_time) / sample_time
-            else:
-                c0, c1 = told[j], 0.0
-                if late.shape[0] > 0:
-                    c0 = late[0, j]
-                    for i in range(late.shape[0] - 1):
-                        late[i, j] = late[i + 1, j]
-                    late[late.shape[0] - 1, j] = told[j]
-            if motors.servo[j]:
-                deviation = 0.0
-                if known and cartesian:
-                    deviation = -foot[j] if j < 3 else 0.0
-                elif known and j < solved:
-                    for i in range(3):
-                        deviation -= inverse[row, j, i] * foot[i]
-                torque = fed[j]
-                if late.shape[0] > 0:
-                    waiting = turning.late
-                    torque = waiting[0, j]
-                    for i in range(late.shape[0] - 1):
-                        waiting[i, j] = waiting[i + 1, j]
-                    waiting[late.shape[0] - 1, j] = fed[j]
-                watched, compensated = turning.observer, turning.compensation
-                if compensate.acts:
-                    inertia_compensation.step(
-                        compensate, motors, j, deviation, known, yielding, watched, compensated
-                    )
-                if identify.acts:
-                    inertia_identification.step(identify, motors, j, watched, turning.identification)
-                if friction.acts:
-                    turns = (reference[k + 1, j] - reference[k, j]) / sample_time / motors.pitch[j]
-                    friction_feedforward.follow(friction, j, turns, turning.friction)
-                signals[k, j, TORQUE] = turning.motor[j, servo_drive.ASKED]
-                if load.shape[0] > 0:
-                    signals[k, j, LOAD] = load[k, 0, j]
-                signals[k, j, ESTIMATE] = watched[j, disturbance_observer.LOAD]
-                signals[k, j, RATIO] = compensated[j, inertia_compensation.RATIO]
-                signals[k, j, EFFECTIVE] = compensated[j, inertia_compensation.INERTIA]
-                signals[k, j, AGREEMENT] = compensated[j, inertia_compensation.AGREEMENT]
-                signals[k, j, INERTIA] = inertia_identification.inertia(
-                    identify, motors, j, turning.identification
-                )
-                servo_drive.sample_step(
-                    motors, j, turning.clock[0], c0 / motors.pitch[j], torque, friction, observer, compensate,
-                    identify, load, k, state, s, transition, held, turning,
-                )  # fmt: skip
-                continue
             # the drive answers itself alone, a mode the drive and itself: all else in `transition` is zero
             q, v = state[j, 0], state[j, 1]
             for i in range(2, s, 2):
                 d, w = state[j, i], state[j, i + 1]
+                if varying.rows[j, i // 2 - 1, 1] > 0:
+                    fading = 0.0 if ideal[j] else (varying.gain[j] * c0 - v) * varying.rate[j]
+                    start = c0 if ideal[j] else 0.0
+                    state[j, i], state[j, i + 1] = structure.swung(
+                        varying, j, i // 2 - 1, joint[k], d, w, start, c1 / sample_time, fading, sample_time
+                    )
+                    continue
                 for r in range(i, i + 2):
                     free = transition[j, r, 0] * q + transition[j, r, 1] * v
                     free += transition[j, r, i] * d + transition[j, r, i + 1] * w
@@ -249,5 +232,4 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
             if ideal[j]:
                 state[j, 0] = reference[k + 1, j]
                 state[j, 1] = reference_velocity[k + 1, j]
-        turning.clock[0] += motors.ticks
     return joint, rate, tool, drive, signals, n

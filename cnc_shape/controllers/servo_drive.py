@@ -1,5 +1,5 @@
 # pyright: basic
-"""Servo drive: encoder, velocity loop and motor, at a tick of their own within every sample of the loop.
+"""Servo drive: encoder, velocity loop and motor, a tick of the velocity loop at a time.
 
 One tick: the encoder is read; the velocity loop asks for a torque; the observer takes the reading; the motor
 moves on with the torque of the tick before: computing takes a tick (spec: inertia compensation, 3.1).
@@ -21,10 +21,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.controllers import disturbance_observer as watching
-from cnc_shape.controllers import friction_feedforward as friction
-from cnc_shape.controllers import inertia_compensation as compensation
-from cnc_shape.controllers import inertia_identification as identification
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.noise import normal
 from cnc_shape.machine import Axis, ServoMotor
@@ -37,23 +33,22 @@ READ, BEFORE = 6, 7  # the encoder now and the tick before, rad
 COLUMNS = 8
 
 
+PITCH = 0  # columns of the numbers of a motor: mm or rad of the joint per rad of the motor
+COUNT = 1  # rad, of the encoder; 0: it is exact
+TRUE_INERTIA, VISCOUS, COULOMB, LIMIT = 2, 3, 4, 5  # kg m^2, N m s, N m, N m
+LAG, DECAY = 6, 7  # what is left of a torque error, in the mean over a tick, and at its end
+BELIEVED = 8  # kg m^2, inertia that the controllers take it for
+GAIN, GROWTH = 9, 10  # N m s, velocity gain at a gain ratio of 1; tick over integral time
+NUMBERS = 11
+
+
 class Motors(NamedTuple):
-    """Servo motors and their velocity loops: a row for every joint, also those that have none."""
+    """Servo motors and their velocity loops."""
 
     servo: IntArray  # (j,) 1: the joint has a servo motor
     ticks: int  # of the velocity loop in a sample
     period: float  # s, of a tick
-    pitch: FloatArray  # (j,) mm or rad of the joint per rad of the motor
-    count: FloatArray  # (j,) rad, of the encoder; 0: it is exact
-    inertia: FloatArray  # (j,) kg m^2
-    viscous: FloatArray  # (j,) N m s
-    coulomb: FloatArray  # (j,) N m
-    limit: FloatArray  # (j,) N m
-    lag: FloatArray  # (j,) mean over a tick of what is left of a torque error
-    decay: FloatArray  # (j,) what is left of it at the end
-    believed: FloatArray  # (j,) kg m^2
-    proportional: FloatArray  # (j,) N m s, velocity gain at a gain ratio of 1
-    integral: FloatArray  # (j,) tick over integral time
+    numbers: FloatArray  # (j,11), a row for every joint, also for one without a motor
     noise: float  # counts, standard deviation of a reading
     seed: int
 
@@ -69,11 +64,7 @@ def motors(joints: Sequence[Axis], sample_time: float, noise: float = 0.0, seed:
     period, ticks = velocity_ticks(joints, sample_time)
     rows = np.array([_row(joint, period) for joint in joints])
     servo = frozen_integers([isinstance(joint.drive, ServoMotor) for joint in joints])
-    pitch, count, inertia, viscous, coulomb, limit, lag, decay, believed, gain, integral = map(frozen, rows.T)
-    return Motors(
-        servo, ticks, period, pitch, count, inertia, viscous, coulomb, limit, lag, decay, believed, gain,
-        integral, noise, seed,
-    )  # fmt: skip
+    return Motors(servo, ticks, period, frozen(rows), noise, seed)
 
 
 def velocity_ticks(joints: Sequence[Axis], sample_time: float) -> tuple[float, int]:
@@ -95,10 +86,10 @@ def velocity_ticks(joints: Sequence[Axis], sample_time: float) -> tuple[float, i
 
 
 def _row(joint: Axis, period: float) -> tuple[float, ...]:
-    """Pitch and what follows it in `Motors`, up to the integral; a joint without motor turns as it moves."""
+    """The numbers of a motor; a joint without one turns as it moves."""
     drive = joint.drive
     if not isinstance(drive, ServoMotor):
-        return (1.0, *(0.0,) * 10)
+        return (1.0, *(0.0,) * (NUMBERS - 1))
     loop, lag = drive.velocity_loop, drive.current_time_constant
     decay = exp(-period / lag) if lag > 0.0 else 0.0
     count = TWO_PI / drive.encoder_counts if drive.encoder_counts else 0.0
@@ -112,23 +103,25 @@ def _row(joint: Axis, period: float) -> tuple[float, ...]:
 def start(motors: Motors, reference: FloatArray) -> FloatArray:
     """Memory of motors at rest where their joints are at `reference` (j,) mm or rad, (j,8)."""
     memory = np.zeros((reference.size, COLUMNS))
-    memory[:, ANGLE] = memory[:, READ] = reference / motors.pitch
-    fine = motors.count > 0.0
-    counts = np.floor(memory[fine, ANGLE] / motors.count[fine] + 0.5)
-    memory[fine, READ] = counts * motors.count[fine]
+    memory[:, ANGLE] = memory[:, READ] = reference / motors.numbers[:, PITCH]
+    count = motors.numbers[:, COUNT]
+    fine = count > 0.0
+    memory[fine, READ] = np.floor(memory[fine, ANGLE] / count[fine] + 0.5) * count[fine]
     memory[:, BEFORE] = memory[:, READ]
     return memory
 
 
 @kernel
-def reading(motors, j, tick, angle):
-    """What the encoder of joint j reads at an angle (rad), rad; tick: number of the reading, for its noise."""
-    count = motors.count[j]
+def reading(angle, count, noise, seed, joint, tick):
+    """What an encoder reads at an angle (rad), rad.
+
+    count rad; noise: standard deviation in counts; seed, joint, tick: of its place among all readings.
+    """
     if count <= 0.0:
         return angle
     counts = angle / count
-    if motors.noise > 0.0:
-        counts += motors.noise * normal(motors.seed, j, tick)
+    if noise > 0.0:
+        counts += noise * normal(seed, joint, tick)
     return np.floor(counts + 0.5) * count
 
 
@@ -136,15 +129,16 @@ def reading(motors, j, tick, angle):
 def measure(motors, j, tick, memory):
     """Read the encoder of joint j at a sample. memory (j,8)."""
     memory[j, BEFORE] = memory[j, READ]
-    memory[j, READ] = reading(motors, j, tick, memory[j, ANGLE])
+    count = motors.numbers[j, COUNT]
+    memory[j, READ] = reading(memory[j, ANGLE], count, motors.noise, motors.seed, j, tick)
 
 
 @kernel
 def velocity_step(error, gain, growth, fed, limit, integral):
     """Torque that a velocity loop asks for, and its integral, N m.
 
-    error rad/s; gain N m s; growth: of the integral in a tick, by gain and error; fed N m: torque fed forward;
-    limit N m.
+    error rad/s; gain N m s; growth: of the integral in a tick, by gain and error; fed N m: torque fed
+    forward; limit N m.
     """
     step = gain * growth * error
     asked = gain * error + (integral + step) + fed
@@ -165,88 +159,3 @@ def motor_step(period, push, drag, rub, lag, decay, asked, load, angle, speed, t
     slowed = abs(free) - rub
     after = copysign(slowed, free) if slowed > 0.0 else 0.0
     return angle + 0.5 * period * (speed + after), after, asked + (torque - asked) * decay
-
-
-@kernel
-def sample_step(
-    motors, j, tick, command, fed, friction_gains, observer, compensate, identify, load, k, state, states,
-    transition, held, memory,
-):  # fmt: skip
-    """Run the ticks of joint j until the next sample.
-
-    tick: number of the first of them; command rad/s and fed N m are held; load (n,ticks,joints) N m, or
-    without rows, of which row k is meant; state (j,s): position, velocity and modes of the joints; transition
-    (j,s,s), held (j,s): of the modes over a tick; memory: a `MotorMemory`.
-
-    What changes from tick to tick is kept in plain variables meanwhile: the arrays could be one and the same
-    for all that the compiler knows, and every step would wait for its writes.
-    """
-    motor, watched, compensated = memory.motor[j], memory.observer[j], memory.compensation[j]
-    angle, speed, torque = motor[ANGLE], motor[SPEED], motor[TORQUE]
-    applied, rubbed, integral = motor[ASKED], motor[FRICTION], motor[INTEGRAL]
-    read, before = motor[READ], motor[BEFORE]
-    seen, seen_speed, estimate = watched[watching.ANGLE], watched[watching.SPEED], watched[watching.LOAD]
-    once, twice, thrice = watched[watching.ONCE], watched[watching.TWICE], watched[watching.THRICE]
-    yielding, pace = compensated[compensation.ANGLE], compensated[compensation.SPEED]
-    holding, ratio = compensated[compensation.HOLDING], compensated[compensation.RATIO]
-    period, pitch, limit, believed = motors.period, motors.pitch[j], motors.limit[j], motors.believed[j]
-    lag, decay, inertia = motors.lag[j], motors.decay[j], motors.inertia[j]
-    push, drag = period / inertia, 1.0 / (1.0 + period * motors.viscous[j] / inertia)
-    rub = period * motors.coulomb[j] / inertia
-    per_period, believed_push = 1.0 / period, period / believed
-    gain = motors.proportional[j] * ratio
-    growth = motors.integral[j] * (ratio if compensate.scales_integral else 1.0)
-    correction, stiffness = observer.load[j], compensate.position_gain[j]
-    passed = 1.0 - observer.pole
-    rubbing = friction.torque(friction_gains, j, memory.friction)
-    loaded = load.shape[0] > 0
-    for i in range(motors.ticks):
-        if i > 0:
-            before, read = read, reading(motors, j, tick + i, angle)
-        error = command - (read - before) * per_period
-        helped = fed + rubbing + observer.feedforward * estimate
-        asked, integral = velocity_step(error, gain, growth, helped, limit, integral)
-        if observer.watches:
-            if compensate.models:
-                left = (1.0 - observer.feedforward) * estimate
-                yielding, pace, holding = compensation.yielded(
-                    period, believed_push, stiffness, gain, growth, left, yielding, pace, holding
-                )
-            if identify.acts:
-                identification.follow(observer, j, seen_speed, memory.identification)
-            given = applied - rubbed
-            seen, seen_speed, estimate = watching.predicted(
-                observer, period, believed_push, correction, given, read, seen, seen_speed, estimate
-            )
-            once += passed * (given - once)
-            twice += passed * (once - twice)
-            thrice += passed * (twice - thrice)
-        slower = speed
-        angle, speed, torque = motor_step(
-            period,
-            push,
-            drag,
-            rub,
-            lag,
-            decay,
-            applied,
-            load[k, i, j] if loaded else 0.0,
-            angle,
-            speed,
-            torque,
-        )
-        applied, rubbed = asked, rubbing
-        acceleration = pitch * (speed - slower) * per_period
-        for m in range(2, states, 2):
-            d, w = state[j, m], state[j, m + 1]
-            for r in range(m, m + 2):
-                free = transition[j, r, m] * d + transition[j, r, m + 1] * w
-                state[j, r] = held[j, r] * acceleration + free
-    state[j, 0], state[j, 1] = pitch * angle, pitch * speed
-    motor[ANGLE], motor[SPEED], motor[TORQUE] = angle, speed, torque
-    motor[ASKED], motor[FRICTION], motor[INTEGRAL] = applied, rubbed, integral
-    motor[READ], motor[BEFORE] = read, before
-    watched[watching.ANGLE], watched[watching.SPEED], watched[watching.LOAD] = seen, seen_speed, estimate
-    watched[watching.ONCE], watched[watching.TWICE], watched[watching.THRICE] = once, twice, thrice
-    compensated[compensation.ANGLE], compensated[compensation.SPEED] = yielding, pace
-    compensated[compensation.HOLDING] = holding

@@ -100,8 +100,10 @@ def path_figure(run: Run) -> Figure:
         programmed = ax.plot(run.path[:, i], run.path[:, j], color=PATH_COLOUR, linewidth=2.2, alpha=0.45)
         kept = worst_rows(signals.tool_error, DRAWN_PATH // 2)
         drawn = _magnified(signals, factor, kept)
-        style = cases[k] if cases[k]["linestyle"] != DOTS else {**cases[k], "linestyle": "-"}
-        tool = ax.plot(drawn[:, i], drawn[:, j], **{**style, "linewidth": 0.8})
+        style: dict[str, Any] = {**cases[k], "linewidth": 0.8}
+        if style["linestyle"] == DOTS:
+            style["linestyle"] = "-"
+        tool = ax.plot(drawn[:, i], drawn[:, j], **style)
         worst = int(signals.tool_error.argmax())
         mark = _magnified(signals, factor, np.array([worst]))
         circle = ax.plot(

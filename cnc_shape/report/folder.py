@@ -23,6 +23,7 @@ from cnc_shape.recording import MOTORS, Samples, Signals, require_finite
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
 from cnc_shape.report.motor_figures import motor_cases, motor_figure
+from cnc_shape.report.position_figure import modes_over_position, position_figure
 from cnc_shape.report.shaper_figure import shaper_figure
 from cnc_shape.report.style import Format, render
 from cnc_shape.report.table import summary_json, tables_csv
@@ -169,6 +170,8 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
     }
     if context.shapers:
         drawn["shapers"] = shaper_figure(context.shapers, context.modes)
+        if wandering := modes_over_position(context.shapers, context.modes):
+            drawn["modes"] = position_figure(wandering)
     return drawn
 
 

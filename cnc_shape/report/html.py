@@ -39,6 +39,8 @@ CAPTIONS = {
     "trade": "Contour error of the tool by kind of shaping: a dot for the structure as modelled, a bar over "
     "all models that the machine file allows for.",
     "shapers": "Left: the impulses. Right: the vibration a mode keeps where its real frequency is off.",
+    "modes": "Left: modes over the position of an axis, the shaper's design point and the band in which it "
+    "leaves little. Right: the vibration it leaves where the axis stands.",
 }
 FROM_SIGNALS = ("path", "error", "vibration", "motion")  # figures that are drawn from the signals
 
@@ -108,7 +110,7 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
             }
             for k, (case, name) in enumerate(zip(summary.cases, row_names(summary), strict=True))
         ],
-        figures=[picture for name, picture in pictures.items() if name not in ("shapers", "trade")],
+        figures=[picture for name, picture in pictures.items() if name not in ("shapers", "modes", "trade")],
         mixed=is_mixed(summary),
         motor_headings=MOTOR_HEADINGS,
         motors=_motor_rows(summary),
@@ -122,7 +124,7 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
         trade_note=explanation(page.trade) if page.trade else "",
         trade_figure=pictures.get("trade"),
         shapers=[_shaper_row(axis, shaper, page.modes[axis]) for axis, shaper in page.shapers.items()],
-        shaper_figure=pictures.get("shapers"),
+        shaper_figures=[pictures[name] for name in ("shapers", "modes") if name in pictures],
         first=one_line(first.name),
         worst_case=one_line(best.name),
         worst=_place_rows(run, best.name, page.program) if run.signals else [],

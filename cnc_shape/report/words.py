@@ -54,7 +54,7 @@ def saturations(summary: Summary) -> list[str]:
         told = [f"motor {j.upper()} for {100.0 * s:.3g} %" for j, s in shares.items() if s > SATURATED]
         if told:
             found.append(
-                f"{case.name}: torque limit reached by {', '.join(told)} of the time; no more answers there"
+                f"{case.name}: torque limit reached by {', '.join(told)} of the time; the loop is open then"
             )
     return found
 

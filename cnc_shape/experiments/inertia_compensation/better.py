@@ -128,10 +128,10 @@ def better_table() -> Table:
         "friction as the command turns, and the load torque that an observer of 300 rad/s sees. The "
         "velocity gain is 1.2 times the nominal one, always: with it the observer leaves a maximum "
         "sensitivity below 2 and 40° of phase from half the inertia to one and a half, where the paper's "
-        "method is nearly unstable at half. The variants are drawn once from a fixed seed, not chosen: "
-        "inertia of every axis within 50 %, the load up to 4.5 s earlier or later, of either sign and "
-        "0.7 to 1.2 times as fast, Coulomb friction within 30 % of what is fed forward, encoders with "
-        "half a count of noise.",
+        "method is nearly unstable at half. The variants are drawn from a fixed seed, other ones than it "
+        "was designed on: inertia of every axis within 50 %, the load up to 4.5 s earlier or later, of "
+        "either sign and 0.7 to 1.2 times as fast, Coulomb friction within 30 % of what is fed forward, "
+        "encoders with half a count of noise.",
     )
 
 

@@ -54,7 +54,7 @@ def estimate_error(trial: Trial, bandwidth: float, delay: float = 0.0) -> float:
     )
     angle = response.joint / pitch
     speed = (np.vstack([angle[1:], angle[-1:]]) - np.vstack([angle[:1], angle[:-1]])) / (2.0 * period)
-    borne = motors.load + viscous * speed + coulomb * np.copysign(1.0, speed)
+    borne = motors.load + viscous * speed + coulomb * np.sign(speed)
     late = round(delay / period)
     borne, seen = borne[: len(borne) - late], motors.estimate[late:]
     return float(np.sqrt(np.mean((seen - borne) ** 2) / np.mean(borne**2)))
