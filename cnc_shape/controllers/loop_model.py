@@ -172,9 +172,12 @@ def loop_transfer(model: LoopModel, z: NDArray[np.complex128]) -> NDArray[np.com
         + coupling.integral * period / (z - 1.0)
         + coupling.derivative * (1.0 - 1.0 / z) / period
     )
-    # position per command of a drive, whose transition is [[1, be], [0, al]]
-    inner = z[:, None, None, None] * np.eye(model.held.shape[1] - 1) - model.drives[:, 1:, 1:]
-    moving = np.linalg.solve(inner, model.held[:, 1:, None])[..., 0]
+    # position per command of a drive, whose transition is [[1, be], [0, al]], be a row where al is a matrix
+    if model.held.shape[1] == 2:
+        moving = model.held[:, 1:] / (z[:, None, None] - model.drives[:, 1, 1:])
+    else:
+        inner = z[:, None, None, None] * np.eye(model.held.shape[1] - 1) - model.drives[:, 1:, 1:]
+        moving = np.linalg.solve(inner, model.held[:, 1:, None])[..., 0]
     drive = (model.held[:, 0] + (model.drives[:, 0, 1:] * moving).sum(axis=-1)) / (z[:, None] - 1.0)
     answer = (model.back @ model.across)[:, None] * controller[:, None, None]
     answer = answer + (np.diag(model.gains) + model.turn)[:, None]

@@ -17,28 +17,23 @@ from itertools import product
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.controllers.bisection import GAIN_RESOLUTION, MOST_GROWTH, largest_factor
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.cross_coupling import CrossCoupling
+from cnc_shape.controllers.growth import first_unstable, largest_coupling, largest_gain, reserve, stable_joint
 from cnc_shape.controllers.loop_model import (
     UNBOUNDED,
     LoopModel,
-    joint_of,
     lags,
     loop_model,
-    pole_radius,
-    rows_of,
     with_coupling,
     without_turn,
 )
-from cnc_shape.controllers.margins import largest_factors
 from cnc_shape.controllers.servo_model import at_ratio, gain_ratios, held_apart
 from cnc_shape.controllers.velocity_loops import out_of_ratio, settles, unsettled
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import Axis, Drive, ServoMotor
 from cnc_shape.program import ROTARY, XYZ
 
-MOST_STATES = 120  # of a loop whose poles are computed
 HINT = "lower position_gain_per_s or cross_coupling.proportional_per_s, or sample faster"
 
 Place = Callable[[int], str]  # index of a pose -> where that is, in words: "at x 20, y 15"
@@ -117,13 +112,20 @@ def largest_stable_coupling(
     """
     coupling = control.cross_coupling or CrossCoupling(control.position_gain)
     coupled, looked = replace(control, cross_coupling=coupling), _everywhere(inverse_jacobians, tangents)
-    factors = [_largest_coupling(loop_model(drives, held, *looked)) for held in held_apart(drives, coupled)]
+    factors = [largest_coupling(loop_model(drives, held, *looked)) for held in held_apart(drives, coupled)]
     return coupling.proportional * min(factors)
 
 
 def largest_stable_position_gain(drive: Drive, control: Control) -> float:
-    """Largest position gain with which a joint is stable by itself, 1/s; infinite for an ideal drive."""
-    return _largest_gain_of(drive, control)[0] if lags(drive) else np.inf
+    """Largest position gain with which a joint is stable by itself, 1/s.
+
+    Infinite for an ideal drive; 0 for a servo motor whose velocity loop does not settle.
+    """
+    if not lags(drive):
+        return np.inf
+    if not all(_settles(drive, at_ratio(control, ratio)) for ratio in gain_ratios((drive,), control)):
+        return 0.0
+    return _largest_gain_of(drive, control)[0]
 
 
 def cartesian_loop(axes: Sequence[Axis], control: Control) -> tuple[tuple[Axis, ...], Control]:
@@ -166,12 +168,12 @@ def _check(
         held = with_coupling(model, 0.0)
         if coupling.orientation:
             _check_turn(held, _nowhere if alike else place)
-        stable = stable and bool(_reserve(held, model).min(initial=1.0) > 0.0)
+        stable = stable and bool(reserve(held, model).min(initial=1.0) > 0.0)
     if stable:
         return
-    factors = [_largest_coupling(model) for model in models]
+    factors = [largest_coupling(model) for model in models]
     model, factor = models[int(np.argmin(factors))], min(factors)
-    largest, worst = coupling.proportional * factor, _first_unstable(model, factor)
+    largest, worst = coupling.proportional * factor, first_unstable(model, factor)
     where = "" if alike else f"{_told(place(worst))}, moving along {_direction(tangents[worst])}"
     pid = model.coupling.integral or model.coupling.derivative
     share = " with its integral and derivative" if pid else ""
@@ -209,12 +211,12 @@ def _check_joint(name: str, drive: Drive, control: Control) -> None:
 
 def _check_turn(held: LoopModel, place: Place) -> None:
     """Refuse a loop that its orientation term makes unstable before anything acts across the path."""
-    reserve = _reserve(without_turn(held), held)
-    if reserve.min(initial=1.0) > 0.0:
+    left = reserve(without_turn(held), held)
+    if left.min(initial=1.0) > 0.0:
         return
     gain = held.coupling.orientation
     raise InfeasibleError(
-        f"the loop of the orientation is unstable{_told(place(int(reserve.argmin())))}: gain {gain:g} 1/s "
+        f"the loop of the orientation is unstable{_told(place(int(left.argmin())))}: gain {gain:g} 1/s "
         "besides the position gain",
         hint="lower cross_coupling.orientation_per_s",
     )
@@ -246,60 +248,13 @@ def _alone(drive: Drive, control: Control) -> LoopModel:
 def _largest_gain_of(drive: Drive, control: Control) -> tuple[float, float]:
     """Largest position gain with which a joint is stable by itself, 1/s, and the ratio that ends it."""
     return min(
-        (_largest_gain(_alone(drive, at_ratio(control, ratio)), 0), ratio)
+        (largest_gain(_alone(drive, at_ratio(control, ratio)), 0), ratio)
         for ratio in gain_ratios((drive,), control)
     )
 
 
 def _stable_alone(drive: Drive, control: Control) -> bool:
-    return _stable_joint(_alone(drive, control), 0, control.position_gain)
-
-
-def _stable_joint(model: LoopModel, joint: int, gain: float) -> bool:
-    return bool(_reserve(joint_of(model, joint, 0.0), joint_of(model, joint, gain))[0] > 0.0)
-
-
-def _largest_gain(model: LoopModel, joint: int) -> float:
-    """Largest position gain with which a joint is stable by itself, 1/s."""
-    unit = 1.0 / model.sample_time
-    whole = joint_of(model, joint, unit)
-    if whole.states > MOST_STATES:
-        return unit * float(largest_factors(joint_of(model, joint, 0.0), whole)[0])
-    return unit * largest_factor(lambda factor: _stable_joint(model, joint, unit * factor))
-
-
-def _reserve(base: LoopModel, whole: LoopModel) -> FloatArray:
-    """What a loop has left before it is unstable, (n,): positive if stable, given that `base` is.
-
-    By the poles; by the frequency response where delays make too many of them.
-    """
-    if whole.states <= MOST_STATES:
-        return 1.0 - pole_radius(whole)
-    return largest_factors(base, whole) - 1.0
-
-
-def _largest_coupling(model: LoopModel) -> float:
-    """Factor by which the gains across the path may grow before any row becomes unstable."""
-    if model.states > MOST_STATES:
-        return float(largest_factors(with_coupling(model, 0.0), model).min(initial=np.inf))
-    suspects = model
-
-    def stable(factor: float) -> bool:
-        nonlocal suspects
-        unstable = np.flatnonzero(pole_radius(with_coupling(suspects, factor)) >= 1.0)
-        if unstable.size:  # what is stable here is so below, and what ends the gain is among the rest
-            suspects = rows_of(suspects, unstable)
-        return not unstable.size
-
-    return largest_factor(stable)
-
-
-def _first_unstable(model: LoopModel, factor: float) -> int:
-    """Row that ends the gains across the path, given the factor by which they may grow."""
-    if model.states > MOST_STATES:
-        return int(largest_factors(with_coupling(model, 0.0), model).argmin())
-    beyond = max((1.0 + 2.0 * GAIN_RESOLUTION) * factor, 1.0 / MOST_GROWTH)
-    return int(pole_radius(with_coupling(model, beyond)).argmax())
+    return stable_joint(_alone(drive, control), 0, control.position_gain)
 
 
 def _told(place: str) -> str:
