@@ -20,6 +20,7 @@ TWINS = {
     "controllers/inertia_compensation.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/inertia_identification.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/loop.py": ("naive.servo_loop", "test_simulation.py"),
+    "controllers/motor_loop.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "controllers/position_loop.py": ("naive.servo_loop", "test_simulation.py"),
     "controllers/servo_drive.py": ("naive_servo.run", "test_inertia_compensation.py"),
     "kernels/arcs.py": ("naive.contour_distance", "test_contour.py"),
