@@ -187,15 +187,11 @@ def test_the_observer_tells_the_load(share):
 
 def test_three_poles_of_the_observer_are_one():
     """Characteristic polynomial of A - L C, coefficient by coefficient."""
+    h, inertia = 2.5e-4, INERTIA
     for bandwidth in (20.0, 150.0, 300.0, 2000.0):
-        h, inertia = 2.5e-4, INERTIA
-        gains = disturbance_observer.gains(OBSERVER.disturbance_observer, np.array([inertia]), h)
-        if bandwidth != 300.0:
-            gains = disturbance_observer.gains(
-                observed(bandwidth).disturbance_observer, np.array([inertia]), h
-            )
+        gains = disturbance_observer.gains(observed(bandwidth).disturbance_observer, h)
         free = np.array([[1.0, h, -(h**2) / (2.0 * inertia)], [0.0, 1.0, -h / inertia], [0.0, 0.0, 1.0]])
-        free[:, 0] -= [gains.angle, gains.speed, gains.load[0]]
+        free[:, 0] -= [gains.angle, gains.speed, inertia * gains.load]
         minors = sum(np.linalg.det(np.delete(np.delete(free, i, 0), i, 1)) for i in range(3))
         z0 = np.exp(-bandwidth * h)
         assert_allclose(

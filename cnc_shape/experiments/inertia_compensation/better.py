@@ -98,9 +98,9 @@ def better_table() -> Table:
         theirs, ours = errors(trial, PAPER), errors(trial, OURS)
         rows += [
             Row(f"ours under {name}: RMS", "µm", None, ours[0], SHOWN,
-                f"the paper's method {theirs[0]:.2f} µm: {theirs[0] / ours[0]:.0f} times"),
+                f"{ours[0] / theirs[0]:.2f} of the paper's method, {theirs[0]:.2f} µm"),
             Row(f"ours under {name}: largest", "µm", None, ours[1], SHOWN,
-                f"the paper's method {theirs[1]:.2f} µm: {theirs[1] / ours[1]:.0f} times"),
+                f"{ours[1] / theirs[1]:.2f} of the paper's method, {theirs[1]:.2f} µm"),
         ]  # fmt: skip
     for method, control in COMPARED.items():
         rms, worst, largest, most = over_variants(control)
