@@ -40,6 +40,7 @@ class OpenMotion:
     blocks: Iterator[Block]
     notes: list[Note] = field(default_factory=list[Note])
     moved: tuple[str, ...] = ()
+    axes: tuple[str, ...] = ()  # of the commands
     timed: bool = False  # the file tells its own times, and nothing was planned
 
     def warnings(self, *, by_name: bool = False) -> list[str]:
@@ -62,6 +63,15 @@ class OpenMotion:
                 "(90 °/s, 900 °/s²), unlimited travel"
             )
         return told
+
+    def unmet_loads(self) -> list[str]:
+        """A warning for every load along an axis that the program leaves out, which is not simulated."""
+        along = [load.direction for load in self.setup.disturbances.loads if isinstance(load.direction, str)]
+        return [
+            f"warning: the load along {axis.upper()} pushes nothing: the program does not name that axis"
+            for axis in dict.fromkeys(along)
+            if axis not in self.axes
+        ]
 
 
 @contextmanager
@@ -191,5 +201,5 @@ def _line_of(near: Sequence[Toolpath], command: Trajectory, row: int) -> int | N
 
 def _watched(blocks: Iterable[Block], motion: OpenMotion) -> Iterator[Block]:
     for block in blocks:
-        motion.moved = block.moved
+        motion.moved, motion.axes = block.moved, block.command.axes
         yield block

@@ -178,7 +178,14 @@ def line_on_toolpath(toolpaths: Sequence[Toolpath], position: FloatArray, place:
 
 
 def refuse_divergence(
-    joints: Joints, reference: FloatArray, ran: Ticks, start: float, sample_time: float, source: str
+    joints: Joints,
+    reference: FloatArray,
+    ran: Ticks,
+    start: float,
+    sample_time: float,
+    source: str,
+    *,
+    loaded: bool,
 ) -> None:
     """Stop where the loop has left all bounds.
 
@@ -194,6 +201,8 @@ def refuse_divergence(
         s, of the first tick, and from one to the next.
     source
         Name of the program.
+    loaded
+        Whether load torques act, which may be more than the motors can hold.
 
     Raises
     ------
@@ -213,6 +222,8 @@ def refuse_divergence(
     raise InfeasibleError(
         f"the loop diverged: {kind} {joints.names[joint]} has left all bounds at "
         f"t = {start + row * sample_time:.4f} s",
-        hint="lower the gains",
+        hint="lower the gains, or the loads: beyond its torque_limit_nm a motor holds none"
+        if loaded
+        else "lower the gains",
         source=source or None,
     )

@@ -177,7 +177,8 @@ class _Stage:
         load, torque = self._torque(now, pose, command, ticks)
         ran = self._loop.run(now.loop, told, poses, self._path(windows), torque)
         before = now.ticks * self._period
-        refuse_divergence(self._joints, told.reference, ran, before, self._period, source)
+        loaded = self._loading is not None
+        refuse_divergence(self._joints, told.reference, ran, before, self._period, source, loaded=loaded)
         position, tool, turn = self._axes(now, pose, ran)
         response = Response(
             command.cut(slice(0, ticks)), frozen(told.reference[:ticks]), ran.joint, position, tool,

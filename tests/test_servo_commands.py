@@ -62,6 +62,38 @@ def test_a_motor_at_its_limit_is_told_on_stderr_and_on_the_page(place, capfd):
     assert "torque limit" not in capfd.readouterr().err
 
 
+def test_a_load_beyond_every_motor_is_blamed_where_the_loop_diverges(place, capfd):
+    text = (place / "strong.yaml").read_text()
+    crushing = text.replace("peak_nm: 2.5", "peak_nm: 1000000")
+    assert crushing != text
+    (place / "crushed.yaml").write_text(crushing)
+    case = ("--cases", "independent+disturbed")
+    assert run(["simulate", "part.nc", "-m", "crushed.yaml", *case]) == 2
+    told = capfd.readouterr().err
+    assert "the loop diverged: axis " in told
+    assert "torque_limit_nm" in told
+
+
+def test_a_load_along_an_axis_that_the_program_leaves_out_is_told(place, capfd):
+    text = (place / "strong.yaml").read_text()
+    turning = """  c:
+    limits: {velocity_deg_s: 360, acceleration_deg_s2: 5000}
+    drive: {type: servo_motor, inertia_kg_m2: 4.6e-4, torque_limit_nm: 7.1, lead_deg_per_rev: 3.6}
+"""
+    loaded = text.replace("planning:", turning + "planning:", 1).replace("path_normal", "c")
+    (place / "turning.yaml").write_text(loaded)
+    both = ("-m", "turning.yaml", "--cases")
+    assert run(["simulate", "part.nc", *both, "independent,independent+disturbed", "-o", "out"]) == 0
+    warning = "the load along C pushes nothing: the program does not name that axis"
+    assert warning in capfd.readouterr().err
+    assert warning in (place / "out" / "run.json").read_text()
+    assert run(["simulate", "part.nc", *both, "independent"]) == 0
+    assert "pushes nothing" not in capfd.readouterr().err
+    (place / "turned.nc").write_text(PROGRAM.replace("F2400", "C90 F2400"))
+    assert run(["simulate", "turned.nc", *both, "independent+disturbed"]) == 0
+    assert "pushes nothing" not in capfd.readouterr().err
+
+
 def test_a_report_from_python_has_the_same_warning(place):
     setup = cs.load_machine("weak.yaml")
     told = cs.simulate_program("part.nc", setup, ["independent+disturbed"])

@@ -100,6 +100,8 @@ def simulate(
         )
     page, kinds = None, () if trade is None else trade.rows()
     notes = [*slowed_notes(slowed, setup), *saturations(result.summary)]
+    if any(case.disturbed for case in result.summary.cases):
+        notes += motion.unmet_loads()
     if wanted:
         from cnc_shape.api import report_context
 
