@@ -13,6 +13,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.kinematics import Kinematics, cartesian
 from cnc_shape.machine import LINEAR_DEFAULT, Axis, IdealDrive, Machine, ServoMotor
+from cnc_shape.program import ROTARY
 
 CARTESIAN = cartesian()
 
@@ -77,19 +78,23 @@ class Joints:
     def torques(self, pose: FloatArray, load: FloatArray) -> FloatArray:
         """Torques on the motors (n,t,j) that hold torques over the axes (n,t,d), at poses (n,p).
 
-        Over an axis, a torque is that of a motor whose screw is like the first joint's. Where joints are axes
-        each motor holds its own; elsewhere what they do together must do the same work.
+        Over an axis that is a joint of its own, a torque is that of its motor. Over the axes of the kinematics
+        it is that of a motor whose screw is like the first joint's, over a rotary one whose gear is like the
+        first rotary joint's, if there is one, and what the motors do together must do the same work.
         """
         if self.cartesian:
             return load
         over = np.zeros((*load.shape[:2], len(self.drives)))
         over[:, :, self.columns] = load
+        pitches = np.array([_pitch(joint) for joint in self.drives])
+        own, coupled = pitches[: self.coupled], slice(self.coupled)
+        turning = np.isin(self.names[coupled], ROTARY)
+        first = _first(own, 1.0)
+        geared = np.where(np.isin(self.kinematics.axes, ROTARY), _first(own[turning], first), first)
         across = self.inverse_jacobian(pose).transpose(0, 2, 1)[:, None]
-        over[:, :, : self.coupled] = np.linalg.solve(across, over[:, :, : self.coupled, None])[..., 0]
-        drives = [joint.drive for joint in self.drives]
-        pitches = [drive.pitch if isinstance(drive, ServoMotor) else 0.0 for drive in drives]
-        first = next((pitch for pitch in pitches if pitch > 0.0), 1.0)
-        return frozen(over * (np.array(pitches) / first))
+        force = over[:, :, coupled] / geared
+        over[:, :, coupled] = np.linalg.solve(across, force[..., None])[..., 0] * own
+        return frozen(over)
 
     def forward(self, joint: FloatArray, near: FloatArray) -> FloatArray:
         """Poses (n,p) of joints (n,j), each near a pose."""
@@ -105,6 +110,16 @@ class Joints:
         own = self.coupled
         moving = np.linalg.solve(self.inverse_jacobian(pose), rates[:, :own, None])[:, :, 0]
         return frozen(np.hstack([moving, rates[:, own:]]))
+
+
+def _pitch(joint: Axis) -> float:
+    """Travel of a joint per turn of its servo motor, mm or rad per rad; 0 for another drive."""
+    return joint.drive.pitch if isinstance(joint.drive, ServoMotor) else 0.0
+
+
+def _first(pitches: FloatArray, default: float) -> float:
+    """The first pitch that there is."""
+    return float(next((pitch for pitch in pitches if pitch > 0.0), default))
 
 
 def joints_of(machine: Machine, kinematics: Kinematics = CARTESIAN) -> Joints:
