@@ -78,7 +78,7 @@ class Joints:
     def torques(self, pose: FloatArray, load: FloatArray) -> FloatArray:
         """Torques on the motors (n,t,j) that hold torques over the axes (n,t,d), at poses (n,p).
 
-        Over an axis that is a joint of its own, a torque is that of its motor. Over the axes of the kinematics
+        Over an axis that is a joint of its own, a torque is that of its motor. Over those of the kinematics
         it is that of a motor whose screw is like the first joint's, over a rotary one whose gear is like the
         first rotary joint's, if there is one, and what the motors do together must do the same work.
         """

@@ -308,6 +308,16 @@ def test_motors_whose_loops_tick_apart_are_refused_at_the_second() -> None:
     assert parse(AXES + other.replace("2.5e-4}", "5.0e-4}"))
 
 
+def test_identification_remembers_enough_samples_to_tell_three_numbers_apart() -> None:
+    short = "control: {sample_time_s: 0.001, inertia_identification: {forgetting_time_s: %s}}\n"
+    with pytest.raises(ConfigError, match=r"0\.01 s are 10 samples, too few") as refused:
+        parse(AXES + short % "0.01")
+    assert refused.value.hint == "remember 50 samples or more: 0.05 s"
+    line, column = refused.value.line, refused.value.column
+    assert (AXES + short).splitlines()[line - 1][column - 1 :].startswith("%s")
+    parse(AXES + short % "0.05")
+
+
 NONE = "axes: {x: {limits: {velocity_mm_s: 100, acceleration_mm_s2: 1000}}}\n"
 
 

@@ -6,7 +6,7 @@ from cnc_shape.config.compensation_models import InertiaCompensationModel
 from cnc_shape.config.complaints import key_place, locate
 from cnc_shape.config.disturbances import GIVE_A_MOTOR, NO_MOTOR, motors_of
 from cnc_shape.config.models import ControlModel
-from cnc_shape.config.yaml_tree import Tree, refuse
+from cnc_shape.config.yaml_tree import Tree, dotted, refuse
 from cnc_shape.controllers import (
     Control,
     CrossCoupling,
@@ -29,6 +29,7 @@ MOTOR_TERMS = (
     "friction_feedforward",
     "inertia_identification",
 )
+FEWEST_REMEMBERED = 50  # samples that identification remembers: with a dozen its sums are rounding, then nan
 
 
 def read_control(
@@ -100,3 +101,13 @@ def _check_motor_terms(source: str, tree: Tree, model: ControlModel, machine: Ma
         if getattr(model, key) is not None and not motors_of(machine):
             path = ("control", key)
             refuse(source, key_place(tree, path), f"{'.'.join(path)}: {NO_MOTOR}", GIVE_A_MOTOR)
+    identify, period = model.inertia_identification, model.sample_time_s
+    if identify is not None and identify.forgetting_time_s < FEWEST_REMEMBERED * period:
+        path = ("control", "inertia_identification", "forgetting_time_s")
+        reason = (
+            f"{identify.forgetting_time_s:g} s are {identify.forgetting_time_s / period:.3g} samples, "
+            "too few to tell inertia, friction and load apart"
+        )
+        hint = f"remember {FEWEST_REMEMBERED} samples or more: {FEWEST_REMEMBERED * period:g} s"
+        place, walked = locate(tree, path)
+        refuse(source, place, f"{dotted(walked)}: {reason}", hint)
