@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -316,6 +317,18 @@ def test_identification_remembers_enough_samples_to_tell_three_numbers_apart() -
     line, column = refused.value.line, refused.value.column
     assert (AXES + short).splitlines()[line - 1][column - 1 :].startswith("%s")
     parse(AXES + short % "0.05")
+
+
+def test_the_file_of_a_load_is_neither_a_pipe_nor_standard_input(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    load = "disturbances: [{type: load_torque, direction: x, profile: {type: table, file: %s}}]\n"
+    (tmp_path / "input.yaml").write_text(AXES + load % '"-"')
+    with pytest.raises(ConfigError, match="no such file"):
+        load_machine("input.yaml")
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "pipe.yaml").write_text(AXES + load % "pipe.csv")
+    with pytest.raises(ConfigError, match=r"pipe\.csv: is a pipe or a device"):
+        load_machine("pipe.yaml")
 
 
 NONE = "axes: {x: {limits: {velocity_mm_s: 100, acceleration_mm_s2: 1000}}}\n"

@@ -31,8 +31,11 @@ def read_load_table(source: str, place: Place, key: str, name: str) -> Columns:
         No such file, at `place`; a fault in it, at its own line and column.
     """
     path = Path(source).parent / name
+    if path.exists() and not path.is_file() and not path.is_dir():
+        refuse(source, place, f"{key}: {path}: is a pipe or a device", "give a file that can be read again")
     try:
-        with open_source(path, ReadingLimits(file_bytes=MAX_BYTES)) as text:
+        # absolute: the name "-" is a file's, too, and not standard input
+        with open_source(path.absolute(), ReadingLimits(file_bytes=MAX_BYTES)) as text:
             rows = [(number, line) for number, line in numbered(text) if line.strip()]
     except ProgramError as error:
         if error.line is None:
