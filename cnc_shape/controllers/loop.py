@@ -134,10 +134,11 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                 following[j] = reference[k, j] - read
             told[j] = 0.0
         position_loop.step(position_gains, following, told)
-        if feed:
+        if feed or servo:
             for j in range(joints):
                 mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
                 mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
+        if feed:
             feedforward.step(feed_gains, mean_velocity, mean_acceleration, told, fed)
         row = 0 if cartesian else (phase + k) // every
         if (couple or known) and not cartesian:
@@ -177,7 +178,6 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                 late[late.shape[0] - 1, j], turning.late[late.shape[0] - 1, j] = told[j], fed[j]
         if servo:
             for j in range(joints):
-                mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
                 deviation[j] = -foot[j] if cartesian and j < linear else 0.0
                 if known and j < solved:
                     for i in range(3):

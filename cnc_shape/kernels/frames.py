@@ -20,8 +20,8 @@ ALONG_Z = 1e-6  # -, sine of the angle to z below which a path runs along it
 
 # What a frame keeps from one sample to the next
 TANGENT, NORMAL, TURN, MEAN_TURN = 0, 3, 6, 9  # three numbers each
-MEAN_SQUARE, MEAN_STEP, MOVING, KNOWN, CURVED = 12, 13, 14, 15, 16
-FRAME_SIZE = 17
+MEAN_SQUARE, MEAN_STEP, MOVING, CURVED = 12, 13, 14, 15
+FRAME_SIZE = 16
 
 
 @kernel
@@ -105,7 +105,7 @@ def path_frames(velocity, acceleration, period, still, share, frame, frames):
             upright(normal, now)
             for a in range(3):
                 tangent[a] = now[a]
-            frame[MOVING] = frame[KNOWN] = 1.0
+            frame[MOVING] = 1.0
         else:
             frame[MOVING] = 0.0
         for a in range(3):
