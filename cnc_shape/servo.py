@@ -130,7 +130,13 @@ def _copied_motors(motors: MotorMemory) -> MotorMemory:
 
 
 def make_loop(joints: Joints, control: Control, noise: EncoderNoise | None = None) -> ServoLoop:
-    """Make the loop of a machine ready."""
+    """Make the loop of a machine ready.
+
+    Raises
+    ------
+    ValueError
+        Not one position gain for every joint, or velocity loops that do not tick together.
+    """
     drives, period = joints.drives, control.sample_time
     gains = control.joint_gains or (control.position_gain,) * len(drives)
     if len(gains) != len(drives):

@@ -69,7 +69,7 @@ def refuse_at(source: str, tree: Tree, path: KeyPath, reason: str, hint: str | N
     refuse(source, place, f"{dotted(walked)}: {reason}", hint)
 
 
-def refuse_key(source: str, tree: Tree, path: KeyPath, reason: str, hint: str | None) -> NoReturn:
+def refuse_key_at(source: str, tree: Tree, path: KeyPath, reason: str, hint: str | None) -> NoReturn:
     """Raise the error of the key at the end of `path`."""
     refuse(source, key_place(tree, path), f"{dotted(path)}: {reason}", hint)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cnc_shape.config.compensation_models import InertiaCompensationModel
-from cnc_shape.config.complaints import refuse_at, refuse_key
+from cnc_shape.config.complaints import refuse_at, refuse_key_at
 from cnc_shape.config.drives import GIVE_A_MOTOR, NO_MOTOR, motors_of
 from cnc_shape.config.models import ControlModel
 from cnc_shape.config.yaml_tree import Tree
@@ -98,4 +98,4 @@ def _compensation(model: InertiaCompensationModel) -> InertiaCompensation:
 def _check_motor_terms(source: str, tree: Tree, model: ControlModel, machine: Machine) -> None:
     for key in MOTOR_TERMS:
         if getattr(model, key) is not None and not motors_of(machine):
-            refuse_key(source, tree, ("control", key), NO_MOTOR, GIVE_A_MOTOR)
+            refuse_key_at(source, tree, ("control", key), NO_MOTOR, GIVE_A_MOTOR)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NoReturn
 
-from cnc_shape.config.complaints import KeyPath, locate, refuse_at, refuse_key
+from cnc_shape.config.complaints import KeyPath, locate, refuse_at, refuse_key_at
 from cnc_shape.config.disturbance_models import (
     MAX_ROWS,
     AnyDisturbance,
@@ -132,7 +132,7 @@ class _Reader:
             for key, given in (("times_s", model.times_s), ("torques_nm", model.torques_nm)):
                 if given is not None:
                     hint = "keep either file:, or times_s: and torques_nm:"
-                    refuse_key(self._source, self._tree, (*path, key), "the table is in a file", hint)
+                    refuse_key_at(self._source, self._tree, (*path, key), "the table is in a file", hint)
             place, _ = locate(self._tree, (*path, "file"))
             return read_load_table(self._source, place, dotted((*path, "file")), model.file)
         if model.times_s is None or model.torques_nm is None:

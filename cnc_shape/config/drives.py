@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from cnc_shape.config.complaints import KeyPath, refuse_at, refuse_key
+from cnc_shape.config.complaints import KeyPath, refuse_at, refuse_key_at
 from cnc_shape.config.drive_models import AnyDrive, FirstOrderLagModel, ServoMotorModel
 from cnc_shape.config.yaml_tree import Tree, dotted
 from cnc_shape.machine import Drive, FirstOrderLag, IdealDrive, Machine, ServoMotor, VelocityLoop
@@ -92,7 +92,7 @@ def _lead(source: str, tree: Tree, path: KeyPath, model: ServoMotorModel, moved:
     wanted, other = list(keys)[:: -1 if moved in ROTARY else 1]
     if keys[other] is not None:
         unit = "degrees" if moved in ROTARY else "mm"
-        refuse_key(source, tree, (*path, other), f"{moved} moves in {unit}", f"give {wanted}")
+        refuse_key_at(source, tree, (*path, other), f"{moved} moves in {unit}", f"give {wanted}")
     lead = keys[wanted]
     if lead is None:
         refuse_at(source, tree, path, f"{wanted} is missing", f"add {wanted}: with its value")
