@@ -42,6 +42,8 @@ SAMPLES = {
     "fan.nc": "cubic_parallel.yaml",
     "helix.nc": "cubic_parallel.yaml",
     "circle5_time.csv": "cubic_parallel.yaml",
+    "servo_square.nc": "servo_three_axis.yaml",
+    "tilted_circle_time.csv": "servo_three_axis.yaml",
 }
 PROGRAMS = [name for name in SAMPLES if not name.endswith("_time.csv")]
 

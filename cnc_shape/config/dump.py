@@ -129,7 +129,7 @@ def _mode(mode: Mode) -> dict[str, object]:
     if mode.damping_uncertainty:
         keys["damping_uncertainty"] = mode.damping_uncertainty
     if mode.table is not None:
-        keys["over_position"] = dump_mode_table(mode.table, to_degrees)
+        keys["over_position"] = dump_mode_table(mode.table)
     return keys
 
 

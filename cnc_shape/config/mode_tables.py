@@ -8,6 +8,7 @@ from typing import NoReturn
 
 from cnc_shape.config.complaints import Path, locate
 from cnc_shape.config.mode_models import OverPositionModel
+from cnc_shape.config.spelling import to_degrees
 from cnc_shape.config.yaml_tree import Tree, dotted, refuse
 from cnc_shape.modes import ModeTable
 from cnc_shape.program import ROTARY, unit_of
@@ -60,7 +61,7 @@ def _column(
     return tuple(values)
 
 
-def dump_mode_table(table: ModeTable, to_degrees: Callable[[float], float]) -> dict[str, object]:
+def dump_mode_table(table: ModeTable) -> dict[str, object]:
     """Return the keys of a table; reading them gives an equal one."""
     rotary = table.axis in ROTARY
     same = len(set(table.damping_ratio)) == 1

@@ -8,8 +8,8 @@ One tick of `h` with command c, angle th and reading y, which is th (spec: inert
     e = c - (y - y_before) / h,  x+ = x + K h / Ti e,  u = K e + x+ + g T^
     motor, observer: exact over the tick under the torque asked for in the tick before, u_before
 
-The motor is answered for exactly, torque behind the lag and viscous friction together. The loop's kernel splits
-them within a tick, because of Coulomb friction, and so bears up to some hundredths more gain than is told here.
+The motor is answered for exactly, torque behind the lag and viscous friction together. The loop's kernel
+splits them within a tick, because of Coulomb friction, and so bears some hundredths more gain than told here.
 
 The controllers believe in the nominal inertia, the motor has its own. The angle itself moves nothing but
 itself: all else is told by what it moved by, so that a velocity loop has no pole that stands at z = 1.
