@@ -20,6 +20,7 @@ from cnc_shape.controllers import (
     position_loop,
     servo_drive,
 )
+from cnc_shape.controllers.compensation import WATCHING
 from cnc_shape.controllers.loop import Command, Memory, Poses, Terms, servo_loop
 from cnc_shape.controllers.motor_loop import MotorMemory
 from cnc_shape.disturbances import EncoderNoise
@@ -157,7 +158,7 @@ def observer_of(control: Control) -> DisturbanceObserver | None:
     if control.disturbance_observer is not None:
         return control.disturbance_observer
     needed = control.inertia_compensation is not None or control.inertia_identification is not None
-    return DisturbanceObserver(feedforward=0.0) if needed else None
+    return WATCHING if needed else None
 
 
 def structure_of(machine: Machine, sample_time: float) -> ServoLoop:

@@ -61,7 +61,7 @@ from cnc_shape.experiments.inertia_compensation.rig import (
     run,
 )
 from cnc_shape.experiments.inertia_compensation.stability import margins_of
-from cnc_shape.experiments.inertia_compensation.studies import _within, loaded
+from cnc_shape.experiments.inertia_compensation.studies import loaded, stretched_burst
 from cnc_shape.experiments.inertia_compensation.time_law import (
     TiltedCircle,
     along,
@@ -142,8 +142,8 @@ def test_equations_at_their_word():
 
 
 def test_without_load_the_compensation_is_not_there():
-    with_it, without = lap(UNLOADED, PAPER).response, lap(UNLOADED, NONE).response
-    assert_array_equal(with_it.position, without.position)
+    with_it, without = lap(UNLOADED, PAPER), lap(UNLOADED, NONE)
+    assert_array_equal(with_it.response.position, without.response.position)
     assert_array_equal(with_it.motors.torque, without.motors.torque)
     assert np.abs(with_it.motors.estimate).max() == pytest.approx(0.086, abs=0.001)
     assert (with_it.motors.gain_ratio == 1.0).all()
@@ -215,7 +215,7 @@ def test_a_load_in_phase_with_the_acceleration_looks_like_inertia():
 
 
 def test_nothing_is_learnt_on_the_circle():
-    assert (lap(LOADED, IDENTIFYING).response.motors.inertia == INERTIA).all()
+    assert (lap(LOADED, IDENTIFYING).motors.inertia == INERTIA).all()
 
 
 def test_the_true_inertia_does_not_matter_at_this_feed():
@@ -329,7 +329,7 @@ def test_other_circles_and_feeds(circle):
     """The burst takes the same part of every lap."""
     radius, feed = circle
     around = TiltedCircle(radius=radius, feed_rate=feed * MM_PER_MIN)
-    trial = replace(LOADED, circle=around, disturbances=load(_within(around)))
+    trial = replace(LOADED, circle=around, disturbances=load(stretched_burst(around)))
     for control, theirs in zip((NONE, PAPER, OBSERVER), CIRCLES[circle], strict=True):
         assert_allclose(errors(trial, control), theirs, rtol=2e-3, atol=0.01)
 
@@ -350,12 +350,11 @@ def test_ours_is_better_and_more_stable_than_the_paper_s():
 
 
 def test_ours_is_better_over_the_variants():
-    rms, worst, largest, most = over_variants(OURS)
-    paper = over_variants(PAPER)
-    assert (rms, worst, largest, most) < paper
-    assert worst < 0.1 * paper[1]
-    assert most < 0.25 * paper[3]
-    assert worst < over_variants(FED_OBSERVER)[1] < 0.45
+    ours, paper = over_variants(OURS), over_variants(PAPER)
+    assert all(np.less(ours, paper))
+    assert ours.worst_rms < 0.1 * paper.worst_rms
+    assert ours.worst_largest < 0.25 * paper.worst_largest
+    assert ours.worst_rms < over_variants(FED_OBSERVER).worst_rms < 0.45
     assert_allclose(paper, (2.22, 2.49, 7.36, 9.16), rtol=0.08)  # of another twenty
 
 
@@ -505,6 +504,5 @@ def raised_under_load(control: Control):
         count = len(told.position) - 1
         parts.append((held.run(memory, told, NO_POSES, PathWindows(), torque[:count]), told.position[:count]))
     (first, _), (second, reference) = parts
-    del _
     before = position[599] - first.joint[-1]
     return before, (second.signals[:, 0, 0], reference[:, 0] - second.joint[:, 0])

@@ -27,9 +27,9 @@ FRAME_SIZE = 17
 @kernel
 def transported(normal, before, after):
     """Turn `normal` (3,) in place by the smallest rotation from one tangent (3,) to another."""
-    sum_ = 1.0 + before[0] * after[0] + before[1] * after[1] + before[2] * after[2]
-    if sum_ > 1e-12:  # else the path turns back, and the normal may stay
-        share = (normal[0] * after[0] + normal[1] * after[1] + normal[2] * after[2]) / sum_
+    divisor = 1.0 + before[0] * after[0] + before[1] * after[1] + before[2] * after[2]
+    if divisor > 1e-12:  # else the path turns back, and the normal may stay
+        share = (normal[0] * after[0] + normal[1] * after[1] + normal[2] * after[2]) / divisor
         for a in range(3):
             normal[a] -= share * (before[a] + after[a])
 
