@@ -7,6 +7,7 @@ from dataclasses import replace
 import naive_servo
 import numpy as np
 import pytest
+from naive import normal_noise
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize_scalar
 
@@ -22,7 +23,7 @@ from cnc_shape.controllers import (
     inertia_compensation,
 )
 from cnc_shape.controllers.loop import Command
-from cnc_shape.disturbances import Disturbances, LoadTorque, PathDirection, ProfileTable
+from cnc_shape.disturbances import Disturbances, EncoderNoise, LoadTorque, PathDirection, ProfileTable
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.experiments.inertia_compensation.better import over_variants
 from cnc_shape.experiments.inertia_compensation.estimation import (
@@ -364,7 +365,7 @@ def kernel_run(trial: Trial, control: Control, samples: int | None = None):
     """The loop's kernel alone, without what refuses loops before; contour error RMS and largest, µm."""
     told, path = command(trial.circle), toolpath(trial.circle)
     rows = len(told) if samples is None else samples
-    loop = make_loop(joints_of(trial.machine, CARTESIAN), control)
+    loop = make_loop(joints_of(trial.machine, CARTESIAN), control, trial.disturbances.noise)
     _, torque = loading(trial.disturbances, XYZ, told.sample_time, loop.motors.ticks)(None, told, rows)
     position, velocity, acceleration = (
         frozen(np.vstack([values, values[-1:]])[: rows + 1])
@@ -404,11 +405,16 @@ TWINNED = {
     "half fed": replace(OBSERVER, feedforward=Feedforward(0.6, 0.3)),
 }
 MOTORS = {
-    "as on the bed": MOTOR,
-    "weak, exact, at once": replace(
-        MOTOR, torque_limit=1.6, encoder_counts=0, current_time_constant=0.0, inertia=1.4 * INERTIA
+    "as on the bed": (MOTOR,) * 3,
+    "weak, exact, at once": (
+        replace(MOTOR, torque_limit=1.6, encoder_counts=0, current_time_constant=0.0, inertia=1.4 * INERTIA),
+    )
+    * 3,
+    "unlike and noisy": tuple(
+        replace(MOTOR, inertia=share * INERTIA, coulomb=0.06) for share in (0.7, 1.0, 1.6)
     ),
 }
+NOISE = EncoderNoise(0.4, 11)
 
 
 def twin_run(trial: Trial, control: Control, samples: int) -> naive_servo.Signals:
@@ -425,6 +431,11 @@ def twin_run(trial: Trial, control: Control, samples: int) -> naive_servo.Signal
     term, observer = control.inertia_compensation, control.disturbance_observer
     friction, fed = control.friction_feedforward, control.feedforward or Feedforward()
     identification = control.inertia_identification
+    noise = np.zeros((0, 3))
+    if trial.disturbances.noise is not None:
+        deviation, seed = trial.disturbances.noise.standard_deviation, trial.disturbances.noise.seed
+        readings = [[normal_noise(seed, j, tick) for j in range(3)] for tick in range(4 * samples)]
+        noise = deviation * np.array(readings)
     settings = naive_servo.Settings(
         inertia=np.array([one.inertia for one in trial.motors]), nominal=motor.believed_inertia,
         viscous=motor.viscous, coulomb=np.array([one.coulomb for one in trial.motors]),
@@ -442,14 +453,15 @@ def twin_run(trial: Trial, control: Control, samples: int) -> naive_servo.Signal
     )  # fmt: skip
     return naive_servo.run(
         settings, position[:-1], np.diff(position, axis=0) / period,
-        np.diff(told.velocity[: samples + 1], axis=0) / period, torque.reshape(-1, 3), np.zeros((0, 3)), nearest,
+        np.diff(told.velocity[: samples + 1], axis=0) / period, torque.reshape(-1, 3), noise, nearest,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("motor", MOTORS)
 @pytest.mark.parametrize("name", TWINNED)
 def test_the_kernel_is_its_slow_twin(name, motor):
-    trial = Trial(FAST, (MOTORS[motor],) * 3, DISTURBED)
+    disturbed = replace(DISTURBED, noise=NOISE) if "noisy" in motor else DISTURBED
+    trial = Trial(FAST, MOTORS[motor], disturbed)
     control, samples = TWINNED[name], 300
     signals = kernel_run(trial, control, samples)[2]
     slow = twin_run(trial, control, samples)

@@ -15,7 +15,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.controllers.compensation import DisturbanceObserver
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 ANGLE, SPEED, LOAD = 0, 1, 2  # columns of an observer's memory: its estimates, rad, rad/s, N m
 ONCE, TWICE, THRICE = 3, 4, 5  # the torque given behind the same poles as the estimate: one, two, all three
@@ -52,7 +52,7 @@ def start(reading: FloatArray) -> FloatArray:
     return memory
 
 
-@kernel
+@inlined
 def predicted(gains, period, believed, per_torque, torque, reading, angle, speed, load):
     """Angle, speed and load expected at the next tick, after a reading (rad) and under a torque (N m).
 
@@ -67,7 +67,7 @@ def predicted(gains, period, believed, per_torque, torque, reading, angle, speed
     )
 
 
-@kernel
+@inlined
 def acceleration(believed, j, memory):
     """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2; believed kg m^2."""
     return (memory[j, THRICE] - memory[j, LOAD]) / believed

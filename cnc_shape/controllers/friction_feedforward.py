@@ -13,7 +13,7 @@ from typing import NamedTuple
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers.compensation import FrictionFeedforward
 from cnc_shape.controllers.lag import remaining
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 from cnc_shape.machine import Axis, ServoMotor
 
 COULOMB, VISCOUS, DECAY = 0, 1, 2  # columns of the numbers
@@ -40,13 +40,13 @@ def gains(
     return FrictionGains(int(feedforward is not None), frozen(rows))
 
 
-@kernel
+@inlined
 def follow(gains, j, speed, memory):
     """Take the commanded speed of the coming sample, rad/s. memory (j,)."""
     memory[j] = speed + (memory[j] - speed) * gains.numbers[j, DECAY]
 
 
-@kernel
+@inlined
 def torque(gains, j, memory):
     """Torque that answers friction, N m. memory (j,) rad/s."""
     if not gains.acts:

@@ -24,7 +24,7 @@ from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers import disturbance_observer as observing
 from cnc_shape.controllers.compensation import GainLaw, InertiaCompensation
 from cnc_shape.controllers.lag import remaining
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 from cnc_shape.machine import Axis, ServoMotor
 
 ANGLE, SPEED, INTEGRAL = 0, 1, 2  # columns of the memory: model of the loop under load, rad, rad/s, N m
@@ -108,7 +108,7 @@ def _regularisation(term: InertiaCompensation, joint: Axis, deadband: float) -> 
     return deadband / joint.drive.believed_inertia if isinstance(joint.drive, ServoMotor) else 0.0
 
 
-@kernel
+@inlined
 def displaced(period, per_torque, position_gain, gain, integral_rate, load, angle, speed, integral):
     """Angle, speed and integral a tick later of a loop that a load (N m) displaces, as the model has it.
 
@@ -121,7 +121,7 @@ def displaced(period, per_torque, position_gain, gain, integral_rate, load, angl
     return angle + period * speed, speed, integral
 
 
-@kernel
+@inlined
 def step(gains, j, believed, pitch, bandwidth, deviation, known, displacement, observed, memory):
     """Set the gain ratio of motor j for the coming sample.
 

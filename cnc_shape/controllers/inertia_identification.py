@@ -17,7 +17,7 @@ from cnc_shape.arrays import FloatArray
 from cnc_shape.controllers import disturbance_observer as observing
 from cnc_shape.controllers.compensation import InertiaIdentification
 from cnc_shape.controllers.lag import remaining
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 EXCITATION = 0  # column of the memory: mean squared acceleration, rad^2/s^4
 SIGN = 1  # of the speed, behind the same poles as the estimate: after one, two and all three of them
@@ -61,7 +61,7 @@ def start(joints: int) -> FloatArray:
     return memory
 
 
-@kernel
+@inlined
 def follow(observer, j, speed, memory):
     """Take the observed speed of a tick (rad/s). memory (j,16)."""
     passing = np.sign(speed)
@@ -70,7 +70,7 @@ def follow(observer, j, speed, memory):
         passing = memory[j, i]
 
 
-@kernel
+@inlined
 def step(gains, j, believed, observed, memory):
     """Learn from a sample. believed kg m^2; observed (j,6) of the observer; memory (j,16)."""
     acceleration = observing.acceleration(believed, j, observed)
@@ -96,7 +96,7 @@ def step(gains, j, believed, observed, memory):
             P[i] *= MOST_DOUBT / trace
 
 
-@kernel
+@inlined
 def inertia(gains, j, believed, memory):
     """Identified inertia of motor j, kg m^2."""
     found = believed + memory[j, PARAMETERS] / SCALE

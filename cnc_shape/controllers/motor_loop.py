@@ -15,7 +15,7 @@ from cnc_shape.controllers import friction_feedforward
 from cnc_shape.controllers import inertia_compensation as compensation
 from cnc_shape.controllers import inertia_identification as identification
 from cnc_shape.controllers import servo_drive as drive
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 TORQUE, LOAD, ESTIMATE, RATIO, EFFECTIVE, AGREEMENT, INERTIA = range(7)  # columns of the motors' signals
 SIGNALS = 7
@@ -33,7 +33,7 @@ class MotorMemory(NamedTuple):
     clock: IntArray  # (1,) readings of the encoders so far
 
 
-@kernel
+@inlined
 def step(
     k, speeds, torques, references, deviation, known, load, motors, friction, observer, compensate, identify,
     memory, push, signals,
@@ -82,7 +82,7 @@ def step(
         )  # fmt: skip
 
 
-@kernel
+@inlined
 def _ticks(
     k, j, tick, command, fed, against_friction, load, motors, observer, compensate, identify, motor,
     observed, compensated, identified, push,

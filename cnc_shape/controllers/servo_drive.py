@@ -22,7 +22,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.controllers.lag import remaining
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 from cnc_shape.kernels.noise import normal
 from cnc_shape.machine import Axis, ServoMotor
 from cnc_shape.units import TWO_PI
@@ -111,7 +111,7 @@ def start(motors: Motors, reference: FloatArray) -> FloatArray:
     return memory
 
 
-@kernel
+@inlined
 def reading(angle, count, noise, seed, joint, tick):
     """What an encoder reads at an angle (rad), rad.
 
@@ -125,7 +125,7 @@ def reading(angle, count, noise, seed, joint, tick):
     return np.floor(counts + 0.5) * count
 
 
-@kernel
+@inlined
 def measure(motors, j, tick, memory):
     """Read the encoder of joint j at a sample. memory (j,8)."""
     memory[j, BEFORE] = memory[j, READ]
@@ -133,7 +133,7 @@ def measure(motors, j, tick, memory):
     memory[j, READ] = reading(memory[j, ANGLE], count, motors.noise, motors.seed, j, tick)
 
 
-@kernel
+@inlined
 def velocity_step(error, gain, integral_rate, fed, limit, integral):
     """Torque that a velocity loop asks for, and its integral, N m.
 
@@ -147,7 +147,7 @@ def velocity_step(error, gain, integral_rate, fed, limit, integral):
     return min(max(asked, -limit), limit), integral
 
 
-@kernel
+@inlined
 def motor_step(period, per_torque, drag, coulomb, lag, decay, asked, load, angle, speed, torque):
     """Angle, speed and torque of a motor a tick later, under the torque asked for the tick before.
 
