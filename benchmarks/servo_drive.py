@@ -59,10 +59,10 @@ def rows() -> Iterator[Row]:
         if measured:
             contour_error(response.position, path, *windows)
 
-    for measured, how in ((False, "simulated"), (True, "simulated, with its contour error")):
+    for measured, how in ((False, "simulated"), (True, "with its contour error")):
         whole(measured=measured)
         ours = best_of(ROUNDS, partial(whole, measured=measured)) / steps
-        stage = f"3 servo axes under load, observer and adaptation, {how}"
+        stage = f"3 servo axes under load, {how}"
         period = SAMPLE_TIME * 1e9
         yield Row(stage, Kind.SPEED_UP, REAL_TIME, "the motion itself", "ns/step", ours * 1e9, period)
 

@@ -13,7 +13,8 @@ from itertools import chain, combinations
 from typing import Final
 
 from cnc_shape.config.setup import CASE_NAMES, Setup, Shaping
-from cnc_shape.controllers import Control, DisturbanceObserver
+from cnc_shape.controllers import Control
+from cnc_shape.controllers.compensation import WATCHING
 from cnc_shape.disturbances import UNDISTURBED, Disturbances
 from cnc_shape.errors import OptionError
 from cnc_shape.pipeline import Case
@@ -89,7 +90,7 @@ def _with_terms(control: Control, terms: Iterable[str]) -> Control:
     observer = control.disturbance_observer
     if not observed:
         watches = compensated or control.inertia_identification is not None
-        observer = replace(observer or DisturbanceObserver(), feedforward=0.0) if watches else None
+        observer = replace(observer or WATCHING, feedforward=0.0) if watches else None
     return replace(
         control,
         cross_coupling=control.cross_coupling if coupled else None,

@@ -161,7 +161,7 @@ class Mode:
         rows = zip(self.table.natural_frequency, self.table.damping_ratio, strict=True)
         return max(self.damped_period, *(1.0 / (f * sqrt(1.0 - zeta**2)) for f, zeta in rows))
 
-    def standing(self, position: float) -> Mode:
+    def at(self, position: float) -> Mode:
         """The mode where the axis of its table stands at `position`, without table; itself without one."""
         if self.table is None:
             return self

@@ -18,7 +18,7 @@ phi_0 = exp x, phi_k = (phi_{k-1} - 1/(k-1)!) / x,
     q'+ =     phi_0 q' + b   (phi_1 u + phi_2 (u_end - u))
 
 A mode with a table leaves these matrices aside: its frequency and damping are those of where the table's
-axis stands when the sample begins, and `kernels.structure.swing` moves it. The drive's acceleration, which
+axis stands when the sample begins, and `kernels.structure.advance` moves it. The drive's acceleration, which
 pushes it, is known within the sample: linear for an ideal drive, and for one with a lag
 ``(gain u - q') / time_constant e^{-t / time_constant}``.
 """

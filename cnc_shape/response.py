@@ -16,7 +16,7 @@ from cnc_shape.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MotorSignals:
-    """What the servo motors did, one column for each of them."""
+    """What the servo motors did, one column for each of them: the signals of the motor loop, in order."""
 
     joints: tuple[str, ...]  # (m,) joints that have a servo motor
     torque: FloatArray  # (n,m) N m, asked of the motors
@@ -30,14 +30,11 @@ class MotorSignals:
 
 def motor_signals(joints: Joints, ran: Ticks) -> MotorSignals | None:
     """What the servo motors of a machine did, if it has any."""
-    turned = [row for row, joint in enumerate(joints.drives) if isinstance(joint.drive, ServoMotor)]
-    if not turned:
+    driven = [row for row, joint in enumerate(joints.drives) if isinstance(joint.drive, ServoMotor)]
+    if not driven:
         return None
-    torque, load, estimate, ratio, effective, agreement, inertia = (
-        frozen(ran.signals[: ran.done, turned, column]) for column in range(SIGNALS)
-    )
-    names = tuple(joints.names[row] for row in turned)
-    return MotorSignals(names, torque, load, estimate, ratio, effective, agreement, inertia)
+    columns = (frozen(ran.signals[: ran.done, driven, column]) for column in range(SIGNALS))
+    return MotorSignals(tuple(joints.names[row] for row in driven), *columns)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -20,6 +20,7 @@ from cnc_shape.controllers import (
     position_loop,
     servo_drive,
 )
+from cnc_shape.controllers.compensation import WATCHING
 from cnc_shape.controllers.loop import Command, Memory, Poses, Terms, servo_loop
 from cnc_shape.controllers.motor_loop import MotorMemory
 from cnc_shape.disturbances import EncoderNoise
@@ -129,7 +130,13 @@ def _copied_motors(motors: MotorMemory) -> MotorMemory:
 
 
 def make_loop(joints: Joints, control: Control, noise: EncoderNoise | None = None) -> ServoLoop:
-    """Make the loop of a machine ready."""
+    """Make the loop of a machine ready.
+
+    Raises
+    ------
+    ValueError
+        Not one position gain for every joint, or velocity loops that do not tick together.
+    """
     drives, period = joints.drives, control.sample_time
     gains = control.joint_gains or (control.position_gain,) * len(drives)
     if len(gains) != len(drives):
@@ -157,7 +164,7 @@ def observer_of(control: Control) -> DisturbanceObserver | None:
     if control.disturbance_observer is not None:
         return control.disturbance_observer
     needed = control.inertia_compensation is not None or control.inertia_identification is not None
-    return DisturbanceObserver(feedforward=0.0) if needed else None
+    return WATCHING if needed else None
 
 
 def structure_of(machine: Machine, sample_time: float) -> ServoLoop:

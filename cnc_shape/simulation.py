@@ -137,13 +137,13 @@ class _Stage:
         self._loop = make_loop(joints, control, disturbances.noise)
         self._structure = None if joints.cartesian else structure_of(machine, self._period)
         coupling = control.cross_coupling
-        self._servo = bool(self._loop.motors.servo.any())
-        explained = self._servo and bool(self._loop.terms.compensation.models) and len(machine.axes) >= 3
+        servo = bool(self._loop.motors.servo.any())
+        compensated = servo and bool(self._loop.terms.compensation.models)
         self._needs_path = coupling is not None and coupling.estimator is Estimator.FOOT_POINT
-        self._searches = self._needs_path or explained
+        self._searches = self._needs_path or (compensated and len(machine.axes) >= 3)
         self._coupled = (coupling is not None or self._searches) and not joints.cartesian
         self._loading = None
-        if self._servo and disturbances.loads:
+        if servo and disturbances.loads:
             axes = tuple(axis.name for axis in machine.axes)
             self._loading = loading(disturbances, axes, self._period, self._loop.motors.ticks)
         self._windows = None

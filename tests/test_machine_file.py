@@ -212,11 +212,11 @@ def test_every_model_is_strict(model: type[Strict]) -> None:
     assert (config.get("strict"), config.get("extra"), config.get("allow_inf_nan")) == (True, "forbid", False)
 
 
-def _key_places(tree: object, path: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
+def key_places(tree: object, path: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
     if isinstance(tree, dict):
-        return [p for key, value in tree.items() for p in [(*path, key), *_key_places(value, (*path, key))]]
+        return [p for key, value in tree.items() for p in [(*path, key), *key_places(value, (*path, key))]]
     if isinstance(tree, list):
-        return [p for i, value in enumerate(tree) for p in _key_places(value, (*path, i))]
+        return [p for i, value in enumerate(tree) for p in key_places(value, (*path, i))]
     return []
 
 
@@ -235,7 +235,7 @@ def _misspelt(path: tuple[object, ...]) -> tuple[str, str]:
 
 @pytest.mark.parametrize(
     "path",
-    _key_places(yaml.safe_load(EVERY_KEY)),
+    key_places(yaml.safe_load(EVERY_KEY)),
     ids=lambda path: ".".join(map(str, path)),
 )
 def test_every_misspelt_key_is_refused_where_it_stands(path: tuple[object, ...]) -> None:
@@ -627,7 +627,7 @@ LEAVES = st.one_of(
 
 
 @settings(max_examples=300)
-@given(st.sampled_from(_key_places(yaml.safe_load(EVERY_KEY))), LEAVES)
+@given(st.sampled_from(key_places(yaml.safe_load(EVERY_KEY))), LEAVES)
 def test_any_value_anywhere_makes_a_setup_or_one_line(path: tuple[object, ...], value: object) -> None:
     document = yaml.safe_load(EVERY_KEY.replace("5e-4", "0.0005").replace("9e4", "90000.0"))
     owner = document

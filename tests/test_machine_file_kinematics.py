@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from test_machine_file import _key_places, outcome_of, parse, refusal
+from test_machine_file import key_places, outcome_of, parse, refusal
 
 from cnc_shape.cli import run
 from cnc_shape.config import bundled, dump_machine, load_machine
@@ -374,7 +374,7 @@ def test_check_tells_an_unstable_joint(tmp_path, capsys) -> None:
 FILES = [
     machine(text, drives(n)) for text, n in ((EVERY_KINEMATICS["rails"], 6), (DELTA, 3), ("\n" + STEWART, 6))
 ]
-PLACES = [(file, path) for file in FILES for path in _key_places(yaml.safe_load(file))]
+PLACES = [(file, path) for file in FILES for path in key_places(yaml.safe_load(file))]
 LEAVES = st.one_of(
     st.none(), st.integers(), st.floats(), st.sampled_from([[], {}, "corexy", "stewart", 0.0, 1e-3, 1e6, 300.0]),
     st.lists(st.sampled_from([0.0, 1.0, -1e6, 1e-300]), min_size=3, max_size=3),

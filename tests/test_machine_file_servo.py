@@ -12,7 +12,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_machine_file import _key_places, outcome_of, parse, refusal
+from test_machine_file import key_places, outcome_of, parse, refusal
 
 from cnc_shape.cases import default_cases, pick_cases
 from cnc_shape.cli import run
@@ -217,7 +217,7 @@ def test_numbers_survive_exactly(threshold: float, lead: float, peak: float, lev
 # --- refusals
 
 
-@pytest.mark.parametrize("path", _key_places(yaml.safe_load(EVERYTHING)), ids=lambda p: ".".join(map(str, p)))
+@pytest.mark.parametrize("path", key_places(yaml.safe_load(EVERYTHING)), ids=lambda p: ".".join(map(str, p)))
 def test_every_misspelt_key_is_refused_where_it_stands(path: tuple[object, ...]) -> None:
     document = yaml.safe_load(EVERYTHING)
     owner = document
@@ -636,7 +636,7 @@ LEAVES = st.one_of(
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.sampled_from(_key_places(yaml.safe_load(EVERYTHING))), LEAVES)
+@given(st.sampled_from(key_places(yaml.safe_load(EVERYTHING))), LEAVES)
 def test_any_value_anywhere_makes_a_setup_or_one_line(path: tuple[object, ...], value: object) -> None:
     document = yaml.safe_load(EVERYTHING)
     owner = document

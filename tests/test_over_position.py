@@ -57,7 +57,7 @@ def test_a_mode_is_followed_over_the_rows_or_the_travel():
 def test_what_is_left_is_the_residual_vibration_of_the_mode_that_stands_there():
     found = over_position(MODE, zvd(MODE))
     for row in range(0, found.position.size, 97):
-        there = MODE.standing(found.position[row])
+        there = MODE.at(found.position[row])
         assert_allclose(found.vibration[row], residual_vibration(zvd(MODE), there), rtol=1e-12)
     assert found.worst == (found.vibration[0], -300.0)
     assert_array_equal(over_position(MODE, None).vibration, 1.0)
@@ -96,7 +96,7 @@ def test_a_check_tells_where_modes_go_and_what_is_left(machine):
     assert_allclose(mode["frequency_hz"], [31.0, 48.0], rtol=1e-12)
     assert_allclose(mode["deviation"], [-0.225, 0.2], rtol=1e-12)
     setup = load_machine(machine)
-    shaped, there = setup.shapers["x"], setup.machine.axis("x").modes[0].standing(-250.0)
+    shaped, there = setup.shapers["x"], setup.machine.axis("x").modes[0].at(-250.0)
     assert_allclose(mode["residual_vibration"], residual_vibration(shaped, there), rtol=1e-12)
     assert mode["residual_vibration_position_mm"] == -250.0
     (warning,) = found["warnings"]

@@ -20,7 +20,7 @@ from cnc_shape.config.dump import dump_machine
 from cnc_shape.config.machine_file import parse_machine
 from cnc_shape.controllers import Control, CrossCoupling, Feedforward
 from cnc_shape.errors import ConfigError, OptionError
-from cnc_shape.kernels.structure import standing, swing
+from cnc_shape.kernels.structure import advance, table_at
 from cnc_shape.kinematics import corexy
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, IdealDrive, Machine, ServoMotor, VelocityLoop
@@ -64,7 +64,7 @@ def test_the_loop_stands_where_the_table_says(rows, position):
     assert_allclose(mode.at(position), expected, rtol=1e-12)
     above = frozen(np.column_stack([rows, frequency, damping]) - 1.0)  # rows of another table before it
     table = frozen(np.vstack([above, np.column_stack([rows, frequency, damping])]))
-    assert_allclose(standing(table, len(rows), 2 * len(rows), position), expected, rtol=1e-12)
+    assert_allclose(table_at(table, len(rows), 2 * len(rows), position), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,8 @@ def test_the_longest_period_is_that_of_the_softest_place():
     assert_allclose(SHAPED_AT.longest_period, 1.0 / (25.0 * np.sqrt(1.0 - 0.01**2)), rtol=1e-15)
     assert SHAPED_AT.damped_period < SHAPED_AT.longest_period
     assert replace(SHAPED_AT, natural_frequency=10.0).longest_period > 0.1
-    assert SHAPED_AT.standing(100.0) == replace(SHAPED_AT, table=None)
-    assert SHAPED_AT.scaled(2.0).standing(0.0).natural_frequency == 100.0
+    assert SHAPED_AT.at(100.0) == replace(SHAPED_AT, table=None)
+    assert SHAPED_AT.scaled(2.0).at(0.0).natural_frequency == 100.0
 
 
 # --- one stretch of time --------------------------------------------------------------------------
@@ -110,7 +110,7 @@ def by_exponential(d, w, omega, zeta, start, slope, fading, rate, time):
 def test_every_push_is_answered_exactly(turn, fade, zeta):
     mixed = (T**2, -T, 1.0, 2.0 / T, 3.0)
     for d, w, start, slope, fading in (*np.diag(mixed).tolist(), mixed):
-        found = swing(d, w, turn / T, zeta, start, slope, fading, fade / T, T)
+        found = advance(d, w, turn / T, zeta, start, slope, fading, fade / T, T)
         expected = by_exponential(d, w, turn / T, zeta, start, slope, fading, fade / T, T)
         scale = max(abs(expected[0]), abs(expected[1]) * T)
         assert_allclose(np.array(found) * [1.0, T], expected * [1.0, T], rtol=0.0, atol=1e-12 * scale)
@@ -118,7 +118,7 @@ def test_every_push_is_answered_exactly(turn, fade, zeta):
 
 def test_a_mode_far_slower_than_the_stretch_is_a_free_mass():
     """Particular and homogeneous solution would cancel to the last digit."""
-    d, w = swing(0.0, 0.0, 1e-6, 0.5, 3.0, 4.0, 0.0, 0.0, T)
+    d, w = advance(0.0, 0.0, 1e-6, 0.5, 3.0, 4.0, 0.0, 0.0, T)
     assert_allclose(d, 3.0 * T**2 / 2.0 + 4.0 * T**3 / 6.0, rtol=1e-9)
     assert_allclose(w, 3.0 * T + 4.0 * T**2 / 2.0, rtol=1e-9)
 
@@ -126,11 +126,13 @@ def test_a_mode_far_slower_than_the_stretch_is_a_free_mass():
 @given(st.floats(1.0, 4000.0), st.floats(0.0, 0.95), st.floats(0.0, 1e5), st.integers(1, 7))
 def test_a_stretch_is_its_parts(omega, zeta, rate, parts):
     start, slope, fading, time = 50.0, -3e4, 80.0, 1.5e-3
-    whole = swing(1e-3, 0.2, omega, zeta, start, slope, fading, rate, time)
+    whole = advance(1e-3, 0.2, omega, zeta, start, slope, fading, rate, time)
     d, w, part_time = 1e-3, 0.2, time / parts
     for k in range(parts):
         t = k * part_time
-        d, w = swing(d, w, omega, zeta, start + slope * t, slope, fading * np.exp(-rate * t), rate, part_time)
+        d, w = advance(
+            d, w, omega, zeta, start + slope * t, slope, fading * np.exp(-rate * t), rate, part_time
+        )
     assert_allclose((d, w * time), (whole[0], whole[1] * time), rtol=0.0, atol=1e-15)
 
 
@@ -205,7 +207,7 @@ def test_where_the_axis_rests_the_mode_is_that_of_the_place(drive):
     command, loop = moving(seconds=0.2, reach=0.0), Control(T, 20.0, 0, Feedforward(1.0, 1.0))
     command = replace(command, position=frozen(command.position + np.array([0.0, 0.0, 70.0])))
     found = simulate(command, machine(drive), loop)
-    expected = simulate(command, machine(drive, SHAPED_AT.standing(70.0)), loop)
+    expected = simulate(command, machine(drive, SHAPED_AT.at(70.0)), loop)
     assert np.abs(expected.tool - expected.position).max() > 0.01
     assert_allclose(found.tool, expected.tool, rtol=0.0, atol=1e-12 if drive != MOTOR else 1e-6)
 
@@ -213,7 +215,7 @@ def test_where_the_axis_rests_the_mode_is_that_of_the_place(drive):
 def test_an_axis_that_does_not_move_stands_at_zero():
     command = point_to_point(T, axes=("x",))
     stage = machine(mode=SHAPED_AT)
-    there = simulate(command, machine(mode=SHAPED_AT.standing(0.0)), Control(T))
+    there = simulate(command, machine(mode=SHAPED_AT.at(0.0)), Control(T))
     assert_allclose(simulate(command, stage, Control(T)).tool, there.tool, rtol=0.0, atol=1e-12)
 
 

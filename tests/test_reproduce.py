@@ -240,9 +240,7 @@ def test_other_amplitudes_are_seen_in_the_order_of_robustness(monkeypatch):
 
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e-?\d+)?")
-CHAOTIC = {
-    "003"
-}  # an encoder rounds: a last bit that another processor sees otherwise goes on to the digits shown
+CHAOTIC = {"003"}  # encoders round: the last bit of another processor goes on to the digits shown
 
 
 @pytest.mark.parametrize("paper", PAPERS)

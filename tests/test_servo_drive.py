@@ -22,6 +22,7 @@ from cnc_shape.controllers import (
     InertiaCompensation,
     InertiaIdentification,
 )
+from cnc_shape.controllers.loop import Command
 from cnc_shape.disturbances import (
     Disturbances,
     EncoderNoise,
@@ -36,7 +37,7 @@ from cnc_shape.kinematics import cartesian, corexy, linear_delta, trunnion_ac
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, FirstOrderLag, Machine, ServoMotor, VelocityLoop
 from cnc_shape.modes import Mode
-from cnc_shape.servo import make_loop
+from cnc_shape.servo import NO_POSES, PathWindows, make_loop
 from cnc_shape.simulation import simulate, simulating
 from cnc_shape.trajectory import Trajectory
 from cnc_shape.windows import foot_windows
@@ -127,9 +128,6 @@ def test_the_current_lag_is_exact_over_a_tick():
     motor = replace(BARE, torque_limit=limit, current_time_constant=tau)
     loop = make_loop(joints_of(machine(motor)), Control(T, 1000.0))
     memory = loop.start(np.zeros(3))
-    from cnc_shape.controllers.loop import Command
-    from cnc_shape.servo import NO_POSES, PathWindows
-
     away = frozen(np.ones((2, 3)))
     none = frozen(np.zeros((2, 3)))
     loop.run(memory, Command(away, none, none, away, none), NO_POSES, PathWindows())

@@ -19,7 +19,7 @@ from cnc_shape.controllers import (
     DisturbanceObserver,
     GainLaw,
     InertiaCompensation,
-    growth,
+    gain_limits,
 )
 from cnc_shape.controllers.loop import Command
 from cnc_shape.controllers.loop_model import closed_loop, loop_model, loop_transfer, open_loop, poles
@@ -582,7 +582,7 @@ def test_what_a_gain_may_grow_by_is_found_without_poles_too(monkeypatch):
     loop = replace(observed(LOOP, 150.0), delay_samples=1, cross_coupling=CrossCoupling(10.0, integral=50.0))
     by_poles = largest_stable_coupling(kinds, loop, np.eye(3)[None])
     gain_by_poles = largest_stable_position_gain(MOTOR, loop)
-    monkeypatch.setattr(growth, "MOST_STATES", 0)
+    monkeypatch.setattr(gain_limits, "MOST_STATES", 0)
     assert_allclose(largest_stable_coupling(kinds, loop, np.eye(3)[None]), by_poles, rtol=3e-5)
     assert_allclose(largest_stable_position_gain(MOTOR, loop), gain_by_poles, rtol=3e-5)
 

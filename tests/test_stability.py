@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from cnc_shape.config import bundled, check_machine
 from cnc_shape.config.loop_check import check_loop
 from cnc_shape.config.setup import Setup
-from cnc_shape.controllers import Control, CrossCoupling, Form, growth
+from cnc_shape.controllers import Control, CrossCoupling, Form, gain_limits
 from cnc_shape.controllers.loop import Command
 from cnc_shape.controllers.loop_model import (
     closed_loop,
@@ -306,7 +306,7 @@ def test_what_a_gain_may_grow_by_is_found_without_poles_too(form, delay, monkeyp
     loop = Control(T, 20.0, delay, None, pid(100.0, form))
     by_poles = largest_stable_coupling(DRIVES, loop, AT, PLANE)
     gain_by_poles = largest_stable_position_gain(DRIVES[0], loop)
-    monkeypatch.setattr(growth, "MOST_STATES", 0)
+    monkeypatch.setattr(gain_limits, "MOST_STATES", 0)
     assert_allclose(largest_stable_coupling(DRIVES, loop, AT, PLANE), by_poles, rtol=3e-5)
     assert_allclose(largest_stable_position_gain(DRIVES[0], loop), gain_by_poles, rtol=3e-5)
     for share, turn in ((0.999, 0.0), (1.001, 0.0), (0.1, 3000.0)):
@@ -401,8 +401,8 @@ def test_the_direction_told_is_the_one_that_ends_the_gain(monkeypatch):
     inverse = linear_delta(150.0, 300.0).inverse_jacobian(np.zeros((1, 3)))
     everywhere = np.repeat(inverse, len(DIRECTIONS), axis=0)
     limits = [largest_stable_coupling(unlike, far, inverse, line[None]) for line in DIRECTIONS]
-    for most in (growth.MOST_STATES, 1):  # by poles, by frequency response
-        monkeypatch.setattr(growth, "MOST_STATES", most)
+    for most in (gain_limits.MOST_STATES, 1):  # by poles, by frequency response
+        monkeypatch.setattr(gain_limits, "MOST_STATES", most)
         with pytest.raises(InfeasibleError) as refused:
             check_along(unlike, far, everywhere, DIRECTIONS, "direction {}".format)
         assert f"direction {int(np.argmin(limits))}, moving" in str(refused.value)

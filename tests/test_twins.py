@@ -7,7 +7,7 @@ import pytest
 
 TESTS = Path(__file__).resolve().parent
 PACKAGE = TESTS.parent / "cnc_shape"
-KERNEL = re.compile(r"^@kernel\ndef (\w+)", re.MULTILINE)
+KERNEL = re.compile(r"^@(?:kernel|inlined)\ndef (\w+)", re.MULTILINE)
 
 # module: what its kernels are compared with, and the test file that does it. Kernels of one module call
 # one another; those that are called from outside are compared, and the rest with them.

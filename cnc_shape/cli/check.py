@@ -202,7 +202,22 @@ def _loop(loop: dict[str, float | None]) -> str:
         "Ms {:.3g}": loop["max_sensitivity"],
         "cross-coupling stable below {:.4g} 1/s": loop["largest_stable_cross_coupling_per_s"],
     }
-    return ", ".join(text.format(number) for text, number in told.items() if number is not None)
+    return _told(told)
+
+
+def _velocity_loops(loop: dict[str, float | None]) -> str:
+    """Say the margins of servo motors' velocity loops in one line."""
+    return _told(
+        {
+            "gain margin {:.3g} dB": loop["velocity_loop_gain_margin_db"],
+            "phase margin {:.3g}°": loop["velocity_loop_phase_margin_deg"],
+            "Ms {:.3g}": loop["velocity_loop_max_sensitivity"],
+        }
+    )
+
+
+def _told(numbers: dict[str, float | None]) -> str:
+    return ", ".join(text.format(number) for text, number in numbers.items() if number is not None)
 
 
 def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
@@ -221,6 +236,7 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
             *(("", f"{mode['axis'].upper()}: {mode['summary']}") for mode in result["position_modes"]),
             ("shapers", shapers or "none"),
             ("loop", _loop(result["loop"])),
+            *([("velocity loops", told)] if (told := _velocity_loops(result["loop"])) else []),
             *([("motors", ", ".join(result["motor_terms"]))] if result["motor_terms"] else []),
             *(
                 [("disturbed", "; ".join(map(_disturbance, result["disturbances"])))]

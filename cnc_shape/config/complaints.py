@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, cast
+from typing import Final, NoReturn, cast
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from cnc_shape.config.strict import suggestion
-from cnc_shape.config.yaml_tree import Place, Tree, dotted
+from cnc_shape.config.yaml_tree import Place, Tree, dotted, refuse
 from cnc_shape.errors import ConfigError
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]  # to a value of a file: keys, and indices of lists
 
 _EXPECTED: Final = {
     "float_type": "a number",
@@ -41,7 +41,7 @@ def complaint(source: str, tree: Tree, error: ValidationError) -> ConfigError:
     return ConfigError(source, place.line, place.column, f"{dotted(path) or 'the file'}: {reason}", hint=hint)
 
 
-def locate(tree: Tree, path: Sequence[str | int]) -> tuple[Place, Path]:
+def locate(tree: Tree, path: Sequence[str | int]) -> tuple[Place, KeyPath]:
     """Return the place and the path of the value that `path` leads to, or of the last thing on it.
 
     Steps that are not in the file (the type's name where there are several, a missing key) are passed over.
@@ -63,8 +63,19 @@ def key_place(tree: Tree, path: Sequence[str | int]) -> Place:
     return tree.keys[str(path[-1])]
 
 
-def _located(tree: Tree, detail: ErrorDetails) -> tuple[Place, Path, ErrorDetails]:
-    within = cast("Path", _context(detail).get("within", ()))
+def refuse_at(source: str, tree: Tree, path: KeyPath, reason: str, hint: str | None) -> NoReturn:
+    """Raise the error of the value that `path` leads to, or of the last thing on it."""
+    place, walked = locate(tree, path)
+    refuse(source, place, f"{dotted(walked)}: {reason}", hint)
+
+
+def refuse_key_at(source: str, tree: Tree, path: KeyPath, reason: str, hint: str | None) -> NoReturn:
+    """Raise the error of the key at the end of `path`."""
+    refuse(source, key_place(tree, path), f"{dotted(path)}: {reason}", hint)
+
+
+def _located(tree: Tree, detail: ErrorDetails) -> tuple[Place, KeyPath, ErrorDetails]:
+    within = cast("KeyPath", _context(detail).get("within", ()))
     place, path = locate(tree, (*detail["loc"], *within))
     if detail["type"] == "key":
         path = (*path, str(_context(detail)["key"]))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from cnc_shape.config.compensation_models import InertiaCompensationModel
-from cnc_shape.config.complaints import key_place, locate
-from cnc_shape.config.disturbances import GIVE_A_MOTOR, NO_MOTOR, motors_of
+from cnc_shape.config.complaints import refuse_at, refuse_key_at
+from cnc_shape.config.drives import GIVE_A_MOTOR, NO_MOTOR, motors_of
 from cnc_shape.config.models import ControlModel
-from cnc_shape.config.yaml_tree import Tree, dotted, refuse
+from cnc_shape.config.yaml_tree import Tree
 from cnc_shape.controllers import (
     Control,
     CrossCoupling,
@@ -49,8 +49,8 @@ def read_control(
     friction, identify = model.friction_feedforward, model.inertia_identification
     if couple and couple.orientation_per_s and kinematics.turn is None:
         path = ("control", "cross_coupling", "orientation_per_s")
-        reason = f"{'.'.join(path)}: the tool of a {kinematics.name} machine does not turn"
-        refuse(source, locate(tree, path)[0], reason, "remove it, or set it to 0")
+        reason = f"the tool of a {kinematics.name} machine does not turn"
+        refuse_at(source, tree, path, reason, "remove it, or set it to 0")
     return Control(
         sample_time=model.sample_time_s,
         position_gain=model.position_gain_per_s,
@@ -99,15 +99,12 @@ def _compensation(model: InertiaCompensationModel) -> InertiaCompensation:
 def _check_motor_terms(source: str, tree: Tree, model: ControlModel, machine: Machine) -> None:
     for key in MOTOR_TERMS:
         if getattr(model, key) is not None and not motors_of(machine):
-            path = ("control", key)
-            refuse(source, key_place(tree, path), f"{'.'.join(path)}: {NO_MOTOR}", GIVE_A_MOTOR)
+            refuse_key_at(source, tree, ("control", key), NO_MOTOR, GIVE_A_MOTOR)
     identify, period = model.inertia_identification, model.sample_time_s
     if identify is not None and identify.forgetting_time_s < FEWEST_REMEMBERED * period:
-        path = ("control", "inertia_identification", "forgetting_time_s")
         reason = (
             f"{identify.forgetting_time_s:g} s are {identify.forgetting_time_s / period:.3g} samples, "
             "too few to tell inertia, friction and load apart"
         )
         hint = f"remember {FEWEST_REMEMBERED} samples or more: {FEWEST_REMEMBERED * period:g} s"
-        place, walked = locate(tree, path)
-        refuse(source, place, f"{dotted(walked)}: {reason}", hint)
+        refuse_at(source, tree, ("control", "inertia_identification", "forgetting_time_s"), reason, hint)

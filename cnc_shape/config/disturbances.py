@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NoReturn
+from typing import NoReturn
 
-from cnc_shape.config.complaints import key_place, locate
+from cnc_shape.config.complaints import KeyPath, locate, refuse_at, refuse_key_at
 from cnc_shape.config.disturbance_models import (
     MAX_ROWS,
     AnyDisturbance,
@@ -16,9 +16,9 @@ from cnc_shape.config.disturbance_models import (
     StepsModel,
     TableModel,
 )
-from cnc_shape.config.drives import KeyPath
+from cnc_shape.config.drives import GIVE_A_MOTOR, NO_MOTOR, motors_of
 from cnc_shape.config.load_table import read_load_table
-from cnc_shape.config.yaml_tree import Tree, dotted, refuse
+from cnc_shape.config.yaml_tree import Tree, dotted
 from cnc_shape.disturbances import (
     Direction,
     Disturbances,
@@ -33,15 +33,6 @@ from cnc_shape.disturbances import (
 )
 from cnc_shape.kinematics import Kinematics
 from cnc_shape.machine import Machine, ServoMotor
-
-NO_MOTOR: Final = "acts on servo motors, and the machine has none"
-GIVE_A_MOTOR: Final = "give a drive {type: servo_motor, ..}, or remove this"
-
-
-def motors_of(machine: Machine) -> tuple[ServoMotor, ...]:
-    """The servo motors of a machine, of joints or axes."""
-    drives = (*machine.joints, *(axis.drive for axis in machine.axes))
-    return tuple(drive for drive in drives if isinstance(drive, ServoMotor))
 
 
 def read_disturbances(
@@ -140,9 +131,8 @@ class _Reader:
         if model.file is not None:
             for key, given in (("times_s", model.times_s), ("torques_nm", model.torques_nm)):
                 if given is not None:
-                    place = key_place(self._tree, (*path, key))
-                    reason = f"{dotted((*path, key))}: the table is in a file"
-                    refuse(self._source, place, reason, "keep either file:, or times_s: and torques_nm:")
+                    hint = "keep either file:, or times_s: and torques_nm:"
+                    refuse_key_at(self._source, self._tree, (*path, key), "the table is in a file", hint)
             place, _ = locate(self._tree, (*path, "file"))
             return read_load_table(self._source, place, dotted((*path, "file")), model.file)
         if model.times_s is None or model.torques_nm is None:
@@ -157,5 +147,4 @@ class _Reader:
             self._refuse(path, f"{values} values at {times} times", "give every time its value")
 
     def _refuse(self, path: KeyPath, reason: str, hint: str) -> NoReturn:
-        place, walked = locate(self._tree, path)
-        refuse(self._source, place, f"{dotted(walked)}: {reason}", hint)
+        refuse_at(self._source, self._tree, path, reason, hint)

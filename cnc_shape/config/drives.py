@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from cnc_shape.config.complaints import key_place, locate
+from cnc_shape.config.complaints import KeyPath, refuse_at, refuse_key_at
 from cnc_shape.config.drive_models import AnyDrive, FirstOrderLagModel, ServoMotorModel
-from cnc_shape.config.yaml_tree import Tree, dotted, refuse
-from cnc_shape.machine import Drive, FirstOrderLag, IdealDrive, ServoMotor, VelocityLoop
+from cnc_shape.config.yaml_tree import Tree, dotted
+from cnc_shape.machine import Drive, FirstOrderLag, IdealDrive, Machine, ServoMotor, VelocityLoop
 from cnc_shape.program import ROTARY
 from cnc_shape.units import DEGREE
 
 MOST_TICKS: Final = 1000  # of a velocity loop in one sample
 TICK_TOLERANCE: Final = 1e-9  # -, by which a sample may miss whole ticks: decimals are no binary fractions
 
-KeyPath = tuple[str | int, ...]
 Drives = Mapping[KeyPath, Drive]  # by where they stand in the file
+
+NO_MOTOR: Final = "acts on servo motors, and the machine has none"
+GIVE_A_MOTOR: Final = "give a drive {type: servo_motor, ..}, or remove this"
 
 
 def drive_of(source: str, tree: Tree, path: KeyPath, model: AnyDrive | None, moved: str) -> Drive:
@@ -34,6 +36,12 @@ def drive_of(source: str, tree: Tree, path: KeyPath, model: AnyDrive | None, mov
     return IdealDrive()
 
 
+def motors_of(machine: Machine) -> tuple[ServoMotor, ...]:
+    """The servo motors of a machine, of joints or axes."""
+    drives = (*machine.joints, *(axis.drive for axis in machine.axes))
+    return tuple(drive for drive in drives if isinstance(drive, ServoMotor))
+
+
 def check_ticks(source: str, tree: Tree, drives: Drives, sample_time: float) -> None:
     """Refuse velocity loops that do not tick together, a whole number of times in every sample.
 
@@ -45,27 +53,25 @@ def check_ticks(source: str, tree: Tree, drives: Drives, sample_time: float) -> 
     motors = [(path, drive) for path, drive in drives.items() if isinstance(drive, ServoMotor)]
     for path, motor in motors:
         tick, first = motor.velocity_loop.sample_time, motors[0][1].velocity_loop.sample_time
-        place, walked = locate(tree, (*path, "velocity_loop", "sample_time_s"))
-        ticks = sample_time / tick
+        ticks, own = sample_time / tick, (*path, "velocity_loop", "sample_time_s")
         if abs(ticks - round(ticks)) > TICK_TOLERANCE * ticks or round(ticks) < 1:
             reason = f"the sample time of {sample_time:g} s is not a whole number of ticks of {tick:g} s"
             hint = "make control.sample_time_s a multiple of velocity_loop.sample_time_s"
-            refuse(source, place, f"{dotted(walked)}: {reason}", hint)
+            refuse_at(source, tree, own, reason, hint)
         if ticks > MOST_TICKS:
             reason = f"{round(ticks)} ticks of {tick:g} s in a sample of {sample_time:g} s"
-            refuse(source, place, f"{dotted(walked)}: {reason}", f"have at most {MOST_TICKS}")
+            refuse_at(source, tree, own, reason, f"have at most {MOST_TICKS}")
         if tick != first:
             reason = f"ticks every {tick:g} s, that of {dotted(motors[0][0])} every {first:g} s"
-            refuse(source, place, f"{dotted(walked)}: {reason}", "give all motors the same sample time")
+            refuse_at(source, tree, own, reason, "give all motors the same sample time")
 
 
 def _motor(source: str, tree: Tree, path: KeyPath, model: ServoMotorModel, moved: str) -> ServoMotor:
     if model.coulomb_nm >= model.torque_limit_nm:
-        place, walked = locate(tree, (*path, "coulomb_nm"))
         reason = (
             f"friction of {model.coulomb_nm:g} N m holds a motor of {model.torque_limit_nm:g} N m for ever"
         )
-        refuse(source, place, f"{dotted(walked)}: {reason}", "check both, and their units")
+        refuse_at(source, tree, (*path, "coulomb_nm"), reason, "check both, and their units")
     loop = model.velocity_loop
     return ServoMotor(
         inertia=model.inertia_kg_m2,
@@ -85,11 +91,9 @@ def _lead(source: str, tree: Tree, path: KeyPath, model: ServoMotorModel, moved:
     keys = {"lead_mm_per_rev": model.lead_mm_per_rev, "lead_deg_per_rev": model.lead_deg_per_rev}
     wanted, other = list(keys)[:: -1 if moved in ROTARY else 1]
     if keys[other] is not None:
-        place = key_place(tree, (*path, other))
         unit = "degrees" if moved in ROTARY else "mm"
-        refuse(source, place, f"{dotted((*path, other))}: {moved} moves in {unit}", f"give {wanted}")
+        refuse_key_at(source, tree, (*path, other), f"{moved} moves in {unit}", f"give {wanted}")
     lead = keys[wanted]
     if lead is None:
-        place, walked = locate(tree, path)
-        refuse(source, place, f"{dotted(walked)}: {wanted} is missing", f"add {wanted}: with its value")
+        refuse_at(source, tree, path, f"{wanted} is missing", f"add {wanted}: with its value")
     return lead * (DEGREE if moved in ROTARY else 1.0)

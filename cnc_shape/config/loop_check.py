@@ -25,7 +25,7 @@ from cnc_shape.kinematics.reach import CONDITION_LIMIT, condition
 from cnc_shape.machine import Drive, ServoMotor
 from cnc_shape.units import DEGREE
 
-NOTHING = Margins(inf, inf, inf, inf)  # where there is no loop: nothing to tell
+NO_MARGINS = Margins(inf, inf, inf, inf)  # where there is no loop: nothing to tell
 
 
 def check_loop(setup: Setup) -> dict[str, float | None]:
@@ -56,7 +56,7 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
         others = replace(control, cross_coupling=None, joint_gains=control.joint_gains[joints.coupled :])
         check_stability(joints.drives[joints.coupled :], others)
     drives = [axis.drive for axis in axes]
-    outer, coupling = NOTHING, np.inf
+    outer, coupling = NO_MARGINS, np.inf
     if len(home) and any(lags(drive) for drive in drives):
         outer = worst(
             worst_margins(drives, held, home[0], DIRECTIONS) for held in held_apart(drives, control)
@@ -84,4 +84,4 @@ def _velocity_loops(drives: Sequence[Drive], control: Control) -> Margins:
         if isinstance(drive, ServoMotor)
         for ratio in gain_ratios((drive,), control)
     ]
-    return worst(found) if found else NOTHING
+    return worst(found) if found else NO_MARGINS

@@ -11,7 +11,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from cnc_shape.config.bundled import bundled
-from cnc_shape.config.complaints import complaint, key_place, locate
+from cnc_shape.config.complaints import complaint, key_place, locate, refuse_at
 from cnc_shape.config.control import read_control
 from cnc_shape.config.disturbances import read_disturbances
 from cnc_shape.config.drives import Drives, check_ticks, drive_of
@@ -28,7 +28,7 @@ from cnc_shape.config.planning import planning_of
 from cnc_shape.config.position_notes import position_notes
 from cnc_shape.config.setup import Setup, ShaperChoice, Shaping
 from cnc_shape.config.shaper_options import NONE, design, key_of
-from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, dotted, read_tree, refuse
+from cnc_shape.config.yaml_tree import MAX_BYTES, Tree, read_tree, refuse
 from cnc_shape.errors import ConfigError, InfeasibleError, OptionError
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine
@@ -241,8 +241,7 @@ def _shaper(source: str, tree: Tree, axis: Axis, choice: ShaperChoice) -> Shaper
         return design(choice, axis.modes)
     except (OptionError, InfeasibleError) as error:
         key = key_of(error.argument)
-        place, walked = locate(tree, path if key is None else (*path, key))
-        refuse(source, place, f"{dotted(walked)}: {error.reason}", error.hint)
+        refuse_at(source, tree, path if key is None else (*path, key), error.reason, error.hint)
 
 
 def _loop_place(tree: Tree) -> tuple[int, int]:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import NoReturn
 
-from cnc_shape.config.complaints import Path, locate
+from cnc_shape.config.complaints import KeyPath, refuse_at
 from cnc_shape.config.mode_models import OverPositionModel
 from cnc_shape.config.spelling import to_degrees
-from cnc_shape.config.yaml_tree import Tree, dotted, refuse
+from cnc_shape.config.yaml_tree import Tree
 from cnc_shape.modes import ModeTable
 from cnc_shape.program import ROTARY, unit_of
 
@@ -17,7 +17,7 @@ IN_MM, IN_DEGREES = "position_mm", "position_deg"
 
 
 def read_mode_table(
-    source: str, tree: Tree, path: Path, model: OverPositionModel, own_axis: str, own_damping: float
+    source: str, tree: Tree, path: KeyPath, model: OverPositionModel, own_axis: str, own_damping: float
 ) -> ModeTable:
     """Return the table of a mode of `own_axis`, whose damping ratio holds where the table gives none.
 
@@ -29,9 +29,8 @@ def read_mode_table(
         Positions in the wrong unit, missing, or not increasing; columns of unlike length.
     """
 
-    def wrong(where: Path, reason: str, hint: str) -> NoReturn:
-        place, walked = locate(tree, (*path, *where))
-        refuse(source, place, f"{dotted(walked)}: {reason}", hint)
+    def wrong(where: KeyPath, reason: str, hint: str) -> NoReturn:
+        refuse_at(source, tree, (*path, *where), reason, hint)
 
     axis = model.axis or own_axis
     key, other = (IN_DEGREES, IN_MM) if axis in ROTARY else (IN_MM, IN_DEGREES)
@@ -51,7 +50,7 @@ def read_mode_table(
 
 
 def _column(
-    key: str, values: list[float], rows: int, wrong: Callable[[Path, str, str], NoReturn]
+    key: str, values: list[float], rows: int, wrong: Callable[[KeyPath, str, str], NoReturn]
 ) -> tuple[float, ...]:
     """Values of all rows; one is that of all."""
     if len(values) == 1:

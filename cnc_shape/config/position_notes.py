@@ -16,7 +16,7 @@ from cnc_shape.shapers.over_position import ModeOverPosition, over_position
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Wandering:
+class VaryingMode:
     """A mode with a table, its place in the machine, and what the shaper of its axis does there."""
 
     axis: str
@@ -72,12 +72,12 @@ class Wandering:
         }
 
 
-def wandering(
+def varying_modes(
     machine: Machine, shapers: Mapping[str, Shaper], choices: Mapping[str, ShaperChoice]
-) -> list[Wandering]:
+) -> list[VaryingMode]:
     """Every mode with a table, over the travel of the table's axis or, where it has none, over the table."""
     return [
-        Wandering(
+        VaryingMode(
             axis.name,
             index,
             choices[axis.name].type if axis.name in shapers else None,
@@ -94,7 +94,7 @@ def position_notes(
 ) -> tuple[Note, ...]:
     """Warn of every shaper that leaves more than 5 % of a mode somewhere on its way."""
     notes: list[Note] = []
-    for mode in wandering(machine, shapers, choices):
+    for mode in varying_modes(machine, shapers, choices):
         if mode.shaper is not None and mode.found.worst[0] > DEFAULT_VIBRATION_TOLERANCE:
             place, _ = locate(tree, ("axes", mode.axis, "modes", mode.index, "over_position"))
             notes.append(Note(place.line, f"axis {mode.axis}: {mode.summary()}"))
@@ -103,5 +103,5 @@ def position_notes(
 
 def position_facts(setup: Setup) -> list[dict[str, object]]:
     """What `check` tells of the modes with tables, ready for JSON."""
-    modes = wandering(setup.machine, setup.acting_shapers, setup.choices)
+    modes = varying_modes(setup.machine, setup.acting_shapers, setup.choices)
     return [{**mode.numbers(), "summary": mode.summary()} for mode in modes]

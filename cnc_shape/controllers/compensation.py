@@ -14,6 +14,9 @@ class DisturbanceObserver:
     feedforward: float = 1.0  # -, share of the estimate that is added to the torque; 0: it only watches
 
 
+WATCHING = DisturbanceObserver(feedforward=0.0)  # where another term needs one and none is configured
+
+
 class GainLaw(Enum):
     """What raises the gain of the velocity loop, as a ratio to its nominal one."""
 
@@ -40,6 +43,11 @@ class InertiaCompensation:
     threshold: float = 5e-3  # mm, displacement at which GainLaw.TRIGGERED is at the largest ratio
     torque_speed_slope: float = 3.32  # rad/s per N m, alpha of the literal readings
 
+    @property
+    def starting_ratio(self) -> float:
+        """Gain ratio before the first sample, -."""
+        return self.max_gain_ratio if self.law is GainLaw.FIXED else 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class FrictionFeedforward:
@@ -55,5 +63,5 @@ class InertiaIdentification:
 
     forgetting_time: float = 1.0  # s
     excitation: float = 200.0  # rad/s^2, RMS acceleration below which nothing is learnt
-    smallest: float = 0.3  # -, of the nominal inertia: bounds of what is told
+    smallest: float = 0.3  # -, of the nominal inertia: bounds of what is identified
     largest: float = 5.0  # -

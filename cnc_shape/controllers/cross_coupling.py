@@ -12,7 +12,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 
 class Estimator(Enum):
@@ -66,7 +66,7 @@ def gains(coupling: CrossCoupling | None) -> CrossCouplingGains:
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def step(
     gains: CrossCouplingGains,
     error: FloatArray,

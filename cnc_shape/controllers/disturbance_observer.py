@@ -15,7 +15,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.controllers.compensation import DisturbanceObserver
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 ANGLE, SPEED, LOAD = 0, 1, 2  # columns of an observer's memory: its estimates, rad, rad/s, N m
 ONCE, TWICE, THRICE = 3, 4, 5  # the torque given behind the same poles as the estimate: one, two, all three
@@ -25,9 +25,9 @@ COLUMNS = 6
 class ObserverGains(NamedTuple):
     """An observer for every motor."""
 
-    watches: int  # 1: there is one
+    acts: int  # 1: there is one
     feedforward: float  # -, share of the estimate that is added to the torque
-    angle: float  # -, correction of the angle per rad of surprise
+    angle: float  # -, correction of the angle per rad of innovation
     speed: float  # 1/s
     load: float  # 1/s^2, times the believed inertia N m/rad
     pole: float  # -
@@ -52,22 +52,22 @@ def start(reading: FloatArray) -> FloatArray:
     return memory
 
 
-@kernel
-def predicted(gains, period, believed, push, torque, reading, angle, speed, load):
+@inlined
+def predicted(gains, period, believed, per_torque, torque, reading, angle, speed, load):
     """Angle, speed and load expected at the next tick, after a reading (rad) and under a torque (N m).
 
-    believed kg m^2; push: speed per torque held for a tick that it makes, rad/s per N m.
+    believed kg m^2; per_torque: speed that a torque held for a tick makes, rad/s per N m.
     """
-    surprise = reading - angle
-    driven = push * (torque - load)
+    innovation = reading - angle
+    driven = per_torque * (torque - load)
     return (
-        angle + period * (speed + 0.5 * driven) + gains.angle * surprise,
-        speed + driven + gains.speed * surprise,
-        load + believed * gains.load * surprise,
+        angle + period * (speed + 0.5 * driven) + gains.angle * innovation,
+        speed + driven + gains.speed * innovation,
+        load + believed * gains.load * innovation,
     )
 
 
-@kernel
+@inlined
 def acceleration(believed, j, memory):
     """Acceleration of motor j that goes with the estimate, as late as that, rad/s^2; believed kg m^2."""
     return (memory[j, THRICE] - memory[j, LOAD]) / believed

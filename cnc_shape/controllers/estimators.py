@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from math import hypot, sqrt
 
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 from cnc_shape.kernels.foot_point import point_at, seek_feet
 
 SMALLEST_CURVATURE = 1e-6  # 1/mm, below which a circle is a line
 SMALLEST_ARM = 1e-9  # mm, from the centre of curvature: nearer to it every direction is as good
 
 
-@kernel
+@inlined
 def look_ahead(velocity, acceleration, k, curved, frame):
     """Set the unit tangent of a command at sample k, and its curvature if `curved`; at rest both stay.
 
@@ -42,7 +42,7 @@ def look_ahead(velocity, acceleration, k, curved, frame):
             frame[1, i] = (acceleration[k, i] - along * frame[0, i]) / speed_v2
 
 
-@kernel
+@inlined
 def tangent_error(tracking, frame, error):
     """Contour error by the tangent: tracking (>=3,) mm; frame (2,3): tangent, curvature; error (3,)."""
     along = tracking[0] * frame[0, 0] + tracking[1] * frame[0, 1] + tracking[2] * frame[0, 2]
@@ -50,7 +50,7 @@ def tangent_error(tracking, frame, error):
         error[i] = tracking[i] - along * frame[0, i]
 
 
-@kernel
+@inlined
 def circle_error(tracking, frame, error):
     """Contour error by the circle of curvature, and by the distance from its plane; as `tangent_error`."""
     bend_v2 = frame[1, 0] ** 2 + frame[1, 1] ** 2 + frame[1, 2] ** 2
@@ -71,7 +71,7 @@ def circle_error(tracking, frame, error):
         error[i] = share * (in_plane + radius * normal) + tracking[i] - in_plane
 
 
-@kernel
+@inlined
 def foot_error(
     position, tracking, k, path, lower, upper, cursor, tools, feet, distance, place, segment, error
 ):

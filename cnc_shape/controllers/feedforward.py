@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 from cnc_shape.machine import Axis, FirstOrderLag, ServoMotor
 
 
@@ -53,7 +53,7 @@ def gains(feedforward: Feedforward, axes: Sequence[Axis]) -> FeedforwardGains:
     return FeedforwardGains(frozen(velocity), frozen(acceleration), frozen(torque))
 
 
-@kernel
+@inlined
 def step(
     gains: FeedforwardGains,
     velocity: FloatArray,

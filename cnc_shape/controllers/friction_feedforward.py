@@ -8,12 +8,12 @@ position loop. So the commanded speed passes a lag like it before its sign is ta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp
 from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers.compensation import FrictionFeedforward
-from cnc_shape.kernels import kernel
+from cnc_shape.controllers.lag import remaining
+from cnc_shape.kernels import inlined
 from cnc_shape.machine import Axis, ServoMotor
 
 COULOMB, VISCOUS, DECAY = 0, 1, 2  # columns of the numbers
@@ -34,19 +34,19 @@ def gains(
     shares = feedforward or FrictionFeedforward(0.0, 0.0)
     rows: list[tuple[float, float, float]] = []
     for joint, lag in zip(joints, lags, strict=True):
-        drive, decay = joint.drive, exp(-sample_time / lag) if lag > 0.0 else 0.0
+        drive, decay = joint.drive, remaining(lag, sample_time)
         coulomb, viscous = (drive.coulomb, drive.viscous) if isinstance(drive, ServoMotor) else (0.0, 0.0)
         rows.append((shares.coulomb * coulomb, shares.viscous * viscous, decay))
     return FrictionGains(int(feedforward is not None), frozen(rows))
 
 
-@kernel
+@inlined
 def follow(gains, j, speed, memory):
     """Take the commanded speed of the coming sample, rad/s. memory (j,)."""
     memory[j] = speed + (memory[j] - speed) * gains.numbers[j, DECAY]
 
 
-@kernel
+@inlined
 def torque(gains, j, memory):
     """Torque that answers friction, N m. memory (j,) rad/s."""
     if not gains.acts:

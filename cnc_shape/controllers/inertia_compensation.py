@@ -16,18 +16,18 @@ The gain is 1 without load, to the bit. What is raised is stiffness: the true in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.controllers import disturbance_observer as watching
+from cnc_shape.controllers import disturbance_observer as observing
 from cnc_shape.controllers.compensation import GainLaw, InertiaCompensation
-from cnc_shape.kernels import kernel
+from cnc_shape.controllers.lag import remaining
+from cnc_shape.kernels import inlined
 from cnc_shape.machine import Axis, ServoMotor
 
-ANGLE, SPEED, HOLDING = 0, 1, 2  # columns of the memory: model of the yielding loop, rad, rad/s, N m
+ANGLE, SPEED, INTEGRAL = 0, 1, 2  # columns of the memory: model of the loop under load, rad, rad/s, N m
 RATIO = 3  # of the velocity gain to its nominal one
 LOAD, ACCELERATION = 4, 5  # leaky windows, N m, rad/s^2
 CROSS, SQUARE = 6, 7  # sums of displacement times contour error, and squared, mm^2
@@ -78,9 +78,9 @@ def gains(
         given.law.value,
         given.max_gain_ratio,
         frozen(rows),
-        _share(given.window, sample_time),
-        _share(given.attack, sample_time),
-        _share(given.release, sample_time),
+        1.0 - remaining(given.window, sample_time),
+        1.0 - remaining(given.attack, sample_time),
+        1.0 - remaining(given.release, sample_time),
         given.forgetting ** (sample_time / MILLISECOND),
         int(given.scale_integral_time),
         given.threshold,
@@ -91,13 +91,9 @@ def gains(
 def start(term: InertiaCompensation | None, joints: int) -> FloatArray:
     """Memory at rest, (j,10)."""
     memory = np.zeros((joints, COLUMNS))
-    memory[:, RATIO] = term.max_gain_ratio if term is not None and term.law is GainLaw.FIXED else 1.0
+    memory[:, RATIO] = 1.0 if term is None else term.starting_ratio
     memory[:, AGREEMENT] = 1.0
     return memory
-
-
-def _share(time_constant: float, sample_time: float) -> float:
-    return 1.0 - exp(-sample_time / time_constant) if time_constant > 0.0 else 1.0
 
 
 def _deadband(term: InertiaCompensation, joint: Axis) -> float:
@@ -112,28 +108,28 @@ def _regularisation(term: InertiaCompensation, joint: Axis, deadband: float) -> 
     return deadband / joint.drive.believed_inertia if isinstance(joint.drive, ServoMotor) else 0.0
 
 
-@kernel
-def yielded(period, push, position_gain, gain, growth, load, angle, speed, holding):
-    """Angle, speed and integral a tick later of a loop that yields to a load (N m), as the model has it.
+@inlined
+def displaced(period, per_torque, position_gain, gain, integral_rate, load, angle, speed, integral):
+    """Angle, speed and integral a tick later of a loop that a load (N m) displaces, as the model has it.
 
-    push: speed per torque held for a tick of the believed inertia, rad/s per N m; gain N m s and growth are
-    those of the velocity loop.
+    per_torque: speed per torque held for a tick of the believed inertia, rad/s per N m; gain N m s and
+    integral_rate are those of the velocity loop.
     """
     error = -position_gain * angle - speed
-    holding += gain * growth * error
-    speed += push * (gain * error + holding - load)
-    return angle + period * speed, speed, holding
+    integral += gain * integral_rate * error
+    speed += per_torque * (gain * error + integral - load)
+    return angle + period * speed, speed, integral
 
 
-@kernel
-def step(gains, j, believed, pitch, bandwidth, deviation, known, yielding, watched, memory):
+@inlined
+def step(gains, j, believed, pitch, bandwidth, deviation, known, displacement, observed, memory):
     """Set the gain ratio of motor j for the coming sample.
 
     believed kg m^2; pitch mm/rad; bandwidth 1/s: of the velocity loop; deviation mm: where the joint is
-    minus where the nearest point of the path would have it; known: 1 where there is a path; yielding mm: how
-    far all joints yield together; watched (j,6) of the observer; memory (j,10).
+    minus where the nearest point of the path would have it; known: 1 where there is a path; displacement mm:
+    under load, as modelled, of all joints together; observed (j,6) of the observer; memory (j,10).
     """
-    load, acceleration = watched[j, watching.LOAD], watching.acceleration(believed, j, watched)
+    load, acceleration = observed[j, observing.LOAD], observing.acceleration(believed, j, observed)
     memory[j, LOAD] += gains.window * (load - memory[j, LOAD])
     memory[j, ACCELERATION] += gains.window * (acceleration - memory[j, ACCELERATION])
     moved = pitch * memory[j, ANGLE]
@@ -146,14 +142,14 @@ def step(gains, j, believed, pitch, bandwidth, deviation, known, yielding, watch
             memory[j, AGREEMENT] = 1.0
     share = min(max(memory[j, AGREEMENT], 0.0), 1.0)
     excess = max(abs(memory[j, LOAD]) - gains.numbers[j, DEADBAND], 0.0)
-    pace = abs(memory[j, ACCELERATION]) + gains.numbers[j, REGULARISATION]
-    inertia = excess / pace if excess > 0.0 else 0.0
+    divisor = abs(memory[j, ACCELERATION]) + gains.numbers[j, REGULARISATION]
+    inertia = excess / divisor if excess > 0.0 else 0.0
     memory[j, INERTIA] = inertia
     smallest = 1.0
     if gains.law == FIXED:
         wanted = gains.largest
     elif gains.law == TRIGGERED:
-        wanted = 1.0 + (gains.largest - 1.0) * min(yielding / gains.threshold, 1.0)
+        wanted = 1.0 + (gains.largest - 1.0) * min(displacement / gains.threshold, 1.0)
     elif gains.law == LITERAL:
         smallest = SMALLEST_RATIO
         wanted = 0.5 * gains.slope * share * (believed + inertia) / bandwidth

@@ -9,15 +9,15 @@ looks like inertia. A load in phase with the acceleration cannot be told from it
 
 from __future__ import annotations
 
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray
-from cnc_shape.controllers import disturbance_observer as watching
+from cnc_shape.controllers import disturbance_observer as observing
 from cnc_shape.controllers.compensation import InertiaIdentification
-from cnc_shape.kernels import kernel
+from cnc_shape.controllers.lag import remaining
+from cnc_shape.kernels import inlined
 
 EXCITATION = 0  # column of the memory: mean squared acceleration, rad^2/s^4
 SIGN = 1  # of the speed, behind the same poles as the estimate: after one, two and all three of them
@@ -35,7 +35,7 @@ class IdentificationGains(NamedTuple):
     acts: int
     forgetting: float  # -, a sample
     share: float  # -, of what is new in the mean squared acceleration
-    excitation_v2: float  # rad^2/s^4, mean square from which on it learns
+    excitation_squared: float  # rad^2/s^4, mean square from which on it learns
     smallest: float  # -, of the believed inertia
     largest: float  # -
 
@@ -43,7 +43,7 @@ class IdentificationGains(NamedTuple):
 def gains(term: InertiaIdentification | None, sample_time: float) -> IdentificationGains:
     """Gains for samples of `sample_time` (s)."""
     given = term or InertiaIdentification()
-    forgetting = exp(-sample_time / given.forgetting_time)
+    forgetting = remaining(given.forgetting_time, sample_time)
     return IdentificationGains(
         int(term is not None),
         forgetting,
@@ -61,7 +61,7 @@ def start(joints: int) -> FloatArray:
     return memory
 
 
-@kernel
+@inlined
 def follow(observer, j, speed, memory):
     """Take the observed speed of a tick (rad/s). memory (j,16)."""
     passing = np.sign(speed)
@@ -70,12 +70,12 @@ def follow(observer, j, speed, memory):
         passing = memory[j, i]
 
 
-@kernel
-def step(gains, j, believed, watched, memory):
-    """Learn from a sample. believed kg m^2; watched (j,6) of the observer; memory (j,16)."""
-    acceleration = watching.acceleration(believed, j, watched)
+@inlined
+def step(gains, j, believed, observed, memory):
+    """Learn from a sample. believed kg m^2; observed (j,6) of the observer; memory (j,16)."""
+    acceleration = observing.acceleration(believed, j, observed)
     memory[j, EXCITATION] += gains.share * (acceleration * acceleration - memory[j, EXCITATION])
-    if memory[j, EXCITATION] < gains.excitation_v2:
+    if memory[j, EXCITATION] < gains.excitation_squared:
         return
     a, s = acceleration / SCALE, memory[j, PARAMETERS - 1]
     P, theta = memory[j, COVARIANCE:], memory[j, PARAMETERS:COVARIANCE]
@@ -83,11 +83,11 @@ def step(gains, j, believed, watched, memory):
     ps = P[3] * a + P[4] * s + P[5]
     p1 = P[6] * a + P[7] * s + P[8]
     weight = 1.0 / (gains.forgetting + a * pa + s * ps + p1)
-    surprise = watched[j, watching.LOAD] - (a * theta[0] + s * theta[1] + theta[2])
+    innovation = observed[j, observing.LOAD] - (a * theta[0] + s * theta[1] + theta[2])
     gain = (pa * weight, ps * weight, p1 * weight)
     column = (pa, ps, p1)
     for row in range(3):
-        theta[row] += gain[row] * surprise
+        theta[row] += gain[row] * innovation
         for i in range(3):
             P[3 * row + i] = (P[3 * row + i] - gain[row] * column[i]) / gains.forgetting
     trace = P[0] + P[4] + P[8]
@@ -96,7 +96,7 @@ def step(gains, j, believed, watched, memory):
             P[i] *= MOST_DOUBT / trace
 
 
-@kernel
+@inlined
 def inertia(gains, j, believed, memory):
     """Identified inertia of motor j, kg m^2."""
     found = believed + memory[j, PARAMETERS] / SCALE

@@ -106,7 +106,7 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
     tool, drive = np.empty((n, joints)), np.empty((n, joints))
     mean_velocity, mean_acceleration = np.empty(joints), np.empty(joints)
     following = np.zeros(max(joints, 3))
-    told, fed, heard, helped = np.empty(joints), np.zeros(joints), np.empty(joints), np.empty(joints)
+    told, fed, heard, heard_torque = np.empty(joints), np.zeros(joints), np.empty(joints), np.empty(joints)
     deviation, push = np.zeros(joints), np.zeros((motors.ticks, joints))
     servo = motors.servo.any()
     signals = np.zeros((n if servo else 0, joints, SIGNALS))
@@ -134,10 +134,11 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                 following[j] = reference[k, j] - read
             told[j] = 0.0
         position_loop.step(position_gains, following, told)
-        if feed:
+        if feed or servo:
             for j in range(joints):
                 mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
                 mean_acceleration[j] = (reference_velocity[k + 1, j] - reference_velocity[k, j]) / sample_time
+        if feed:
             feedforward.step(feed_gains, mean_velocity, mean_acceleration, told, fed)
         row = 0 if cartesian else (phase + k) // every
         if (couple or known) and not cartesian:
@@ -169,22 +170,21 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                         told[j] += inverse[row, j, i] * couple_gains.orientation * tracking[i]
         for j in range(joints):
             drive[k, j] = told[j]
-            heard[j], helped[j] = told[j], fed[j]
+            heard[j], heard_torque[j] = told[j], fed[j]
             if late.shape[0] > 0:
-                heard[j], helped[j] = late[0, j], turning.late[0, j]
+                heard[j], heard_torque[j] = late[0, j], turning.late[0, j]
                 for i in range(late.shape[0] - 1):
                     late[i, j], turning.late[i, j] = late[i + 1, j], turning.late[i + 1, j]
                 late[late.shape[0] - 1, j], turning.late[late.shape[0] - 1, j] = told[j], fed[j]
         if servo:
             for j in range(joints):
-                mean_velocity[j] = (reference[k + 1, j] - reference[k, j]) / sample_time
                 deviation[j] = -foot[j] if cartesian and j < linear else 0.0
                 if known and j < solved:
                     for i in range(3):
                         deviation[j] -= inverse[row, j, i] * foot[i]
             motor_loop.step(
-                k, heard, helped, mean_velocity, deviation, known, load, motors, friction, observer,
-                compensate, identify, turning, push, signals,
+                k, heard, heard_torque, mean_velocity, deviation, known, load, motors, friction,
+                observer, compensate, identify, turning, push, signals,
             )  # fmt: skip
         for j in range(joints):
             s = states[j]
@@ -196,7 +196,7 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                     for i in range(2, s, 2):
                         d, w = state[j, i], state[j, i + 1]
                         if varying.rows[j, i // 2 - 1, 1] > 0:
-                            state[j, i], state[j, i + 1] = structure.swung(
+                            state[j, i], state[j, i + 1] = structure.mode_after(
                                 varying, j, i // 2 - 1, joint[k], d, w, push[t, j], 0.0, 0.0, motors.period
                             )
                             continue
@@ -218,7 +218,7 @@ def servo_loop(command, poses, path, lower, upper, load, sample_time, plant, mot
                 if varying.rows[j, i // 2 - 1, 1] > 0:
                     fading = 0.0 if ideal[j] else (varying.gain[j] * c0 - v) * varying.rate[j]
                     start = c0 if ideal[j] else 0.0
-                    state[j, i], state[j, i + 1] = structure.swung(
+                    state[j, i], state[j, i + 1] = structure.mode_after(
                         varying, j, i // 2 - 1, joint[k], d, w, start, c1 / sample_time, fading, sample_time
                     )
                     continue

@@ -1,7 +1,7 @@
 # pyright: basic
 """Motor loop: what happens in the servo drives of a machine from one sample of the loop to the next.
 
-Once a sample the gain of a drive and the inertia it takes its motor for are thought over. Then, several
+Once a sample the velocity gain and the identified inertia of every drive are set. Then, several
 times, the velocity loop asks for a torque, the observer takes what the encoder reads, and the motor moves on
 under the torque of the tick before.
 """
@@ -10,12 +10,12 @@ from math import sqrt
 from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray, IntArray
-from cnc_shape.controllers import disturbance_observer as watching
-from cnc_shape.controllers import friction_feedforward as rubbing
+from cnc_shape.controllers import disturbance_observer as observing
+from cnc_shape.controllers import friction_feedforward
 from cnc_shape.controllers import inertia_compensation as compensation
 from cnc_shape.controllers import inertia_identification as identification
 from cnc_shape.controllers import servo_drive as drive
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 TORQUE, LOAD, ESTIMATE, RATIO, EFFECTIVE, AGREEMENT, INERTIA = range(7)  # columns of the motors' signals
 SIGNALS = 7
@@ -33,7 +33,7 @@ class MotorMemory(NamedTuple):
     clock: IntArray  # (1,) readings of the encoders so far
 
 
-@kernel
+@inlined
 def step(
     k, speeds, torques, references, deviation, known, load, motors, friction, observer, compensate, identify,
     memory, push, signals,
@@ -45,14 +45,14 @@ def step(
     it is known; (j,) each. load (n,ticks,j) N m, or without rows; memory: a `MotorMemory`; push (ticks,j)
     mm/s^2: becomes the acceleration of every tick; signals (n,j,7): row k is set.
     """
-    motor, watched, compensated = memory.motor, memory.observer, memory.compensation
+    motor, observed, compensated = memory.motor, memory.observer, memory.compensation
     tick, ticks = memory.clock[0], motors.ticks
     memory.clock[0] += ticks
-    yielding = 0.0
+    displacement = 0.0
     if compensate.acts:
         for j in range(speeds.size):
-            yielding += (motors.numbers[j, drive.PITCH] * compensated[j, compensation.ANGLE]) ** 2
-        yielding = sqrt(yielding)
+            displacement += (motors.numbers[j, drive.PITCH] * compensated[j, compensation.ANGLE]) ** 2
+        displacement = sqrt(displacement)
     for j in range(speeds.size):
         if not motors.servo[j]:
             continue
@@ -60,31 +60,32 @@ def step(
         if compensate.acts:
             bandwidth = motors.numbers[j, drive.GAIN] / believed
             compensation.step(
-                compensate, j, believed, pitch, bandwidth, deviation[j], known, yielding, watched, compensated
-            )
+                compensate, j, believed, pitch, bandwidth, deviation[j], known, displacement, observed,
+                compensated,
+            )  # fmt: skip
         if identify.acts:
-            identification.step(identify, j, believed, watched, memory.identification)
-        fed, rubbed = torques[j], 0.0
+            identification.step(identify, j, believed, observed, memory.identification)
+        fed, against_friction = torques[j], 0.0
         if friction.acts:
-            rubbing.follow(friction, j, references[j] / pitch, memory.friction)
-            rubbed = rubbing.torque(friction, j, memory.friction)
+            friction_feedforward.follow(friction, j, references[j] / pitch, memory.friction)
+            against_friction = friction_feedforward.torque(friction, j, memory.friction)
         signals[k, j, TORQUE] = motor[j, drive.ASKED]
         signals[k, j, LOAD] = load[k, 0, j] if load.shape[0] > 0 else 0.0
-        signals[k, j, ESTIMATE] = watched[j, watching.LOAD]
+        signals[k, j, ESTIMATE] = observed[j, observing.LOAD]
         signals[k, j, RATIO] = compensated[j, compensation.RATIO]
         signals[k, j, EFFECTIVE] = compensated[j, compensation.INERTIA]
         signals[k, j, AGREEMENT] = compensated[j, compensation.AGREEMENT]
         signals[k, j, INERTIA] = identification.inertia(identify, j, believed, memory.identification)
         _ticks(
-            k, j, tick, speeds[j] / pitch, fed, rubbed, load, motors, observer, compensate, identify, motor,
-            watched, compensated, memory.identification, push,
+            k, j, tick, speeds[j] / pitch, fed, against_friction, load, motors, observer, compensate,
+            identify, motor, observed, compensated, memory.identification, push,
         )  # fmt: skip
 
 
-@kernel
+@inlined
 def _ticks(
-    k, j, tick, command, fed, rubbed, load, motors, observer, compensate, identify, motor, watched,
-    compensated, identified, push,
+    k, j, tick, command, fed, against_friction, load, motors, observer, compensate, identify, motor,
+    observed, compensated, identified, push,
 ):  # fmt: skip
     """Run the ticks of joint j, under a command (rad/s), a torque fed forward and one against friction (N m).
 
@@ -95,54 +96,56 @@ def _ticks(
     pitch, count = motors.numbers[j, drive.PITCH], motors.numbers[j, drive.COUNT]
     inertia, believed = motors.numbers[j, drive.TRUE_INERTIA], motors.numbers[j, drive.BELIEVED]
     lag, decay = motors.numbers[j, drive.LAG], motors.numbers[j, drive.DECAY]
-    limit, rub = motors.numbers[j, drive.LIMIT], period * motors.numbers[j, drive.COULOMB] / inertia
-    turned, drag = period / inertia, 1.0 / (1.0 + period * motors.numbers[j, drive.VISCOUS] / inertia)
-    per_period, believed_turned = 1.0 / period, period / believed
+    limit, coulomb = motors.numbers[j, drive.LIMIT], period * motors.numbers[j, drive.COULOMB] / inertia
+    per_torque, drag = period / inertia, 1.0 / (1.0 + period * motors.numbers[j, drive.VISCOUS] / inertia)
+    per_period, believed_per_torque = 1.0 / period, period / believed
     angle, speed, torque = motor[j, drive.ANGLE], motor[j, drive.SPEED], motor[j, drive.TORQUE]
-    applied, rubbed_before = motor[j, drive.ASKED], motor[j, drive.FRICTION]
+    applied, friction_before = motor[j, drive.ASKED], motor[j, drive.FRICTION]
     integral, read, before = motor[j, drive.INTEGRAL], motor[j, drive.READ], motor[j, drive.BEFORE]
-    seen, seen_speed = watched[j, watching.ANGLE], watched[j, watching.SPEED]
-    estimate, passed = watched[j, watching.LOAD], 1.0 - observer.pole
-    once, twice, thrice = watched[j, watching.ONCE], watched[j, watching.TWICE], watched[j, watching.THRICE]
-    yielding, pace = compensated[j, compensation.ANGLE], compensated[j, compensation.SPEED]
-    holding, ratio = compensated[j, compensation.HOLDING], compensated[j, compensation.RATIO]
-    gain, growth = motors.numbers[j, drive.GAIN] * ratio, motors.numbers[j, drive.GROWTH]
+    seen, seen_speed = observed[j, observing.ANGLE], observed[j, observing.SPEED]
+    estimate, once = observed[j, observing.LOAD], observed[j, observing.ONCE]
+    twice, thrice = observed[j, observing.TWICE], observed[j, observing.THRICE]
+    share = 1.0 - observer.pole
+    model_angle, model_speed = compensated[j, compensation.ANGLE], compensated[j, compensation.SPEED]
+    model_integral, ratio = compensated[j, compensation.INTEGRAL], compensated[j, compensation.RATIO]
+    gain, integral_rate = motors.numbers[j, drive.GAIN] * ratio, motors.numbers[j, drive.INTEGRAL_RATE]
     position_gain = compensate.numbers[j, compensation.POSITION_GAIN]
     if compensate.scales_integral:
-        growth *= ratio
+        integral_rate *= ratio
     loaded = load.shape[0] > 0
     for i in range(motors.ticks):
         if i > 0:
             before, read = read, drive.reading(angle, count, noise, seed, j, tick + i)
         error = command - (read - before) * per_period
-        helped = fed + rubbed + observer.feedforward * estimate
-        asked, integral = drive.velocity_step(error, gain, growth, helped, limit, integral)
-        if observer.watches:
+        fed_forward = fed + against_friction + observer.feedforward * estimate
+        asked, integral = drive.velocity_step(error, gain, integral_rate, fed_forward, limit, integral)
+        if observer.acts:
             if compensate.models:
                 left = (1.0 - observer.feedforward) * estimate
-                yielding, pace, holding = compensation.yielded(
-                    period, believed_turned, position_gain, gain, growth, left, yielding, pace, holding
-                )
+                model_angle, model_speed, model_integral = compensation.displaced(
+                    period, believed_per_torque, position_gain, gain, integral_rate, left,
+                    model_angle, model_speed, model_integral,
+                )  # fmt: skip
             if identify.acts:
                 identification.follow(observer, j, seen_speed, identified)
-            given = applied - rubbed_before
-            seen, seen_speed, estimate = watching.predicted(
-                observer, period, believed, believed_turned, given, read, seen, seen_speed, estimate
+            given = applied - friction_before
+            seen, seen_speed, estimate = observing.predicted(
+                observer, period, believed, believed_per_torque, given, read, seen, seen_speed, estimate
             )
-            once += passed * (given - once)
-            twice += passed * (once - twice)
-            thrice += passed * (twice - thrice)
-        slower, pushed = speed, load[k, i, j] if loaded else 0.0
+            once += share * (given - once)
+            twice += share * (once - twice)
+            thrice += share * (twice - thrice)
+        speed_before, load_torque = speed, load[k, i, j] if loaded else 0.0
         angle, speed, torque = drive.motor_step(
-            period, turned, drag, rub, lag, decay, applied, pushed, angle, speed, torque
+            period, per_torque, drag, coulomb, lag, decay, applied, load_torque, angle, speed, torque
         )
-        applied, rubbed_before = asked, rubbed
-        push[i, j] = pitch * (speed - slower) * per_period
+        applied, friction_before = asked, against_friction
+        push[i, j] = pitch * (speed - speed_before) * per_period
     motor[j, drive.ANGLE], motor[j, drive.SPEED], motor[j, drive.TORQUE] = angle, speed, torque
-    motor[j, drive.ASKED], motor[j, drive.FRICTION] = applied, rubbed_before
+    motor[j, drive.ASKED], motor[j, drive.FRICTION] = applied, friction_before
     motor[j, drive.INTEGRAL], motor[j, drive.READ], motor[j, drive.BEFORE] = integral, read, before
-    watched[j, watching.ANGLE], watched[j, watching.SPEED] = seen, seen_speed
-    watched[j, watching.LOAD] = estimate
-    watched[j, watching.ONCE], watched[j, watching.TWICE], watched[j, watching.THRICE] = once, twice, thrice
-    compensated[j, compensation.ANGLE], compensated[j, compensation.SPEED] = yielding, pace
-    compensated[j, compensation.HOLDING] = holding
+    observed[j, observing.ANGLE], observed[j, observing.SPEED] = seen, seen_speed
+    observed[j, observing.LOAD], observed[j, observing.ONCE] = estimate, once
+    observed[j, observing.TWICE], observed[j, observing.THRICE] = twice, thrice
+    compensated[j, compensation.ANGLE], compensated[j, compensation.SPEED] = model_angle, model_speed
+    compensated[j, compensation.INTEGRAL] = model_integral

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cnc_shape.arrays import FloatArray
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined
 
 
 class PositionGains(NamedTuple):
@@ -14,7 +14,7 @@ class PositionGains(NamedTuple):
     proportional: FloatArray  # (j,) 1/s
 
 
-@kernel
+@inlined
 def step(gains: PositionGains, following: FloatArray, drive: FloatArray) -> None:
     """Add ``Kp (q_command - q)`` to the velocity command. following, drive (j,) mm, mm/s."""
     for j in range(drive.size):

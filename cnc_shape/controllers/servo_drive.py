@@ -15,13 +15,14 @@ Everything here is in rad and N m; a screw turns the axis's mm or rad into those
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import copysign, exp
+from math import copysign
 from typing import NamedTuple
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.kernels import kernel
+from cnc_shape.controllers.lag import remaining
+from cnc_shape.kernels import inlined
 from cnc_shape.kernels.noise import normal
 from cnc_shape.machine import Axis, ServoMotor
 from cnc_shape.units import TWO_PI
@@ -32,13 +33,12 @@ INTEGRAL = 5  # of the velocity loop, N m
 READ, BEFORE = 6, 7  # the encoder now and the tick before, rad
 COLUMNS = 8
 
-
 PITCH = 0  # columns of the numbers of a motor: mm or rad of the joint per rad of the motor
 COUNT = 1  # rad, of the encoder; 0: it is exact
 TRUE_INERTIA, VISCOUS, COULOMB, LIMIT = 2, 3, 4, 5  # kg m^2, N m s, N m, N m
 LAG, DECAY = 6, 7  # what is left of a torque error, in the mean over a tick, and at its end
 BELIEVED = 8  # kg m^2, inertia that the controllers take it for
-GAIN, GROWTH = 9, 10  # N m s, velocity gain at a gain ratio of 1; tick over integral time
+GAIN, INTEGRAL_RATE = 9, 10  # N m s, velocity gain at a gain ratio of 1; tick over integral time
 NUMBERS = 11
 
 
@@ -91,7 +91,7 @@ def _row(joint: Axis, period: float) -> tuple[float, ...]:
     if not isinstance(drive, ServoMotor):
         return (1.0, *(0.0,) * (NUMBERS - 1))
     loop, lag = drive.velocity_loop, drive.current_time_constant
-    decay = exp(-period / lag) if lag > 0.0 else 0.0
+    decay = remaining(lag, period)
     count = TWO_PI / drive.encoder_counts if drive.encoder_counts else 0.0
     believed = drive.believed_inertia
     return (
@@ -111,7 +111,7 @@ def start(motors: Motors, reference: FloatArray) -> FloatArray:
     return memory
 
 
-@kernel
+@inlined
 def reading(angle, count, noise, seed, joint, tick):
     """What an encoder reads at an angle (rad), rad.
 
@@ -125,7 +125,7 @@ def reading(angle, count, noise, seed, joint, tick):
     return np.floor(counts + 0.5) * count
 
 
-@kernel
+@inlined
 def measure(motors, j, tick, memory):
     """Read the encoder of joint j at a sample. memory (j,8)."""
     memory[j, BEFORE] = memory[j, READ]
@@ -133,29 +133,29 @@ def measure(motors, j, tick, memory):
     memory[j, READ] = reading(memory[j, ANGLE], count, motors.noise, motors.seed, j, tick)
 
 
-@kernel
-def velocity_step(error, gain, growth, fed, limit, integral):
+@inlined
+def velocity_step(error, gain, integral_rate, fed, limit, integral):
     """Torque that a velocity loop asks for, and its integral, N m.
 
-    error rad/s; gain N m s; growth: of the integral in a tick, by gain and error; fed N m: torque fed
-    forward; limit N m.
+    error rad/s; gain N m s; integral_rate: tick over integral time; fed N m: torque fed forward;
+    limit N m.
     """
-    step = gain * growth * error
+    step = gain * integral_rate * error
     asked = gain * error + (integral + step) + fed
     if abs(asked) <= limit or asked * error < 0.0:  # else the integral would wind up
         integral += step
     return min(max(asked, -limit), limit), integral
 
 
-@kernel
-def motor_step(period, push, drag, rub, lag, decay, asked, load, angle, speed, torque):
+@inlined
+def motor_step(period, per_torque, drag, coulomb, lag, decay, asked, load, angle, speed, torque):
     """Angle, speed and torque of a motor a tick later, under the torque asked for the tick before.
 
-    push: speed per torque held for a tick, rad/s per N m; drag: factor by which viscous friction slows;
-    rub rad/s: what Coulomb friction takes of the speed; lag, decay: of the current; load N m.
+    per_torque: speed per torque held for a tick, rad/s per N m; drag: factor by which viscous friction slows;
+    coulomb rad/s: what Coulomb friction takes of the speed; lag, decay: of the current; load N m.
     """
     mean = asked + (torque - asked) * lag
-    free = (speed + push * (mean - load)) * drag
-    slowed = abs(free) - rub
+    free = (speed + per_torque * (mean - load)) * drag
+    slowed = abs(free) - coulomb
     after = copysign(slowed, free) if slowed > 0.0 else 0.0
     return angle + 0.5 * period * (speed + after), after, asked + (torque - asked) * decay

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from math import exp, inf
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -32,14 +32,19 @@ from numpy.typing import NDArray
 from scipy.linalg import expm  # pyright: ignore[reportUnknownVariableType]  # scipy ships no types
 
 from cnc_shape.arrays import FloatArray, frozen
-from cnc_shape.controllers.compensation import DisturbanceObserver, GainLaw, InertiaCompensation
+from cnc_shape.controllers import disturbance_observer
+from cnc_shape.controllers.compensation import (
+    WATCHING,
+    DisturbanceObserver,
+    GainLaw,
+    InertiaCompensation,
+)
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.inertia_compensation import SMALLEST_RATIO
 from cnc_shape.machine import Drive, ServoMotor
 
 BETWEEN = 8  # steps from the lowest ratio to the highest at which a loop is looked at
 NO_LAG = 1e-6  # -, share of a tick below which a current lag is none
-UNWATCHED = DisturbanceObserver(feedforward=0.0)
 
 Complex = NDArray[np.complex128]
 
@@ -101,7 +106,7 @@ def velocity_tick(motor: ServoMotor, control: Control) -> LinearDrive:
     told = gain * error + held + observer.feedforward * load
     moving = _motion(motor, h)
     moved, sped, risen = moving @ np.stack([speed, torque, asked])
-    pole = 1.0 - exp(-observer.bandwidth * h)
+    correction = disturbance_observer.gains(observer, h)
     driven = h / believed * (asked - load)
     after = np.stack([
         angle + moved,
@@ -110,9 +115,9 @@ def velocity_tick(motor: ServoMotor, control: Control) -> LinearDrive:
         torque + risen,
         told,
         held,
-        ahead + h * seen + 0.5 * h * driven - 3.0 * pole * ahead - moved,
-        seen + driven - (3.0 * pole**2 - 0.5 * pole**3) / h * ahead,
-        load + believed * pole**3 / h**2 * ahead,
+        ahead + h * seen + 0.5 * h * driven - correction.angle * ahead - moved,
+        seen + driven - correction.speed * ahead,
+        load - believed * correction.load * ahead,
     ])  # fmt: skip
     used = np.array([True] * 5 + [loop.integral_time < inf] + [observer.feedforward != 0.0] * 3)
     return LinearDrive(after[used, :-1][:, used], after[used, -1])
@@ -141,7 +146,7 @@ def torque_transfer(motor: ServoMotor, control: Control, z: Complex) -> Complex:
     heard = (1.0 - z**-ticks) / (1.0 - 1.0 / z) / ticks * z**-late
     answer = gain * (1.0 + rate * h * z / (z - 1.0))
     answer = answer * (control.position_gain * heard + (1.0 - 1.0 / z) / h)
-    pole = exp(-observer.bandwidth * h)
+    pole = disturbance_observer.gains(observer, h).pole
     filtered = observer.feedforward * (1.0 - pole) ** 3 / (z - pole) ** 3
     answer = answer + filtered * believed * (z - 1.0) ** 2 / h**2
     answer = answer / (1.0 - 0.5 * filtered * (z + 1.0) / z)
@@ -169,13 +174,13 @@ def _any_motor(drives: Sequence[Drive]) -> bool:
 
 
 def _observer(control: Control) -> DisturbanceObserver:
-    return control.disturbance_observer or UNWATCHED
+    return control.disturbance_observer or WATCHING
 
 
 def _gains(motor: ServoMotor, control: Control) -> tuple[float, float]:
     """Torque gain of the velocity loop, N m s, and the rate of its integral, 1/s."""
     term, loop = control.inertia_compensation, motor.velocity_loop
-    ratio = term.max_gain_ratio if term is not None and term.law is GainLaw.FIXED else 1.0
+    ratio = 1.0 if term is None else term.starting_ratio
     stiffening = ratio if term is not None and term.scale_integral_time else 1.0
     return motor.believed_inertia * loop.bandwidth * ratio, stiffening / loop.integral_time
 
@@ -183,11 +188,11 @@ def _gains(motor: ServoMotor, control: Control) -> tuple[float, float]:
 def _motion(motor: ServoMotor, h: float) -> FloatArray:
     """What angle, speed and torque grow by over a tick, per speed, torque and torque asked for, (3,3)."""
     lag = motor.current_time_constant
-    return _growth(motor.inertia, motor.viscous, lag if lag > NO_LAG * h else 0.0, h)
+    return _exact_motion(motor.inertia, motor.viscous, lag if lag > NO_LAG * h else 0.0, h)
 
 
 @lru_cache(maxsize=256)
-def _growth(inertia: float, viscous: float, lag: float, h: float) -> FloatArray:
+def _exact_motion(inertia: float, viscous: float, lag: float, h: float) -> FloatArray:
     """As `_motion`, exactly."""
     rates = np.zeros((4, 4))
     rates[0, 1] = 1.0

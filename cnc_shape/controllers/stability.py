@@ -19,7 +19,13 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.cross_coupling import CrossCoupling
-from cnc_shape.controllers.growth import first_unstable, largest_coupling, largest_gain, reserve, stable_joint
+from cnc_shape.controllers.gain_limits import (
+    first_unstable,
+    largest_coupling,
+    largest_gain,
+    reserve,
+    stable_joint,
+)
 from cnc_shape.controllers.loop_model import (
     UNBOUNDED,
     LoopModel,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cnc_shape.controllers.control import Control
-from cnc_shape.controllers.growth import largest_factor, last_stable
+from cnc_shape.controllers.gain_limits import largest_factor, last_stable
 from cnc_shape.controllers.servo_model import at_ratio, gain_ratios, velocity_tick
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.machine import Drive, ServoMotor

@@ -1,4 +1,4 @@
-"""The one decorator of all compiled code, and where its machine code is kept.
+"""The two decorators of all compiled code, and where its machine code is kept.
 
 Kernels take arrays and floats, have no defaults, and know neither units nor names of axes.
 
@@ -27,7 +27,7 @@ from llvmlite import binding
 from numba.core import config, event
 
 _PACKAGE: Final = Path(__file__).resolve().parent.parent
-_MARK: Final = re.compile(rb"^@kernel\b", re.MULTILINE)
+_MARK: Final = re.compile(rb"^@(?:kernel|inlined)\b", re.MULTILINE)
 FOLDER_NAME: Final = "cnc-shape"
 _LOG: Final = logging.getLogger(__name__)
 
@@ -121,9 +121,22 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     To the type checker a kernel takes anything and returns anything: its docstring gives shapes and
     units, and the API function that calls it checks them.
     """
+    return _compiled(function)
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `kernel`, and made part of every kernel that calls it.
+
+    For what is called at every tick and handed arrays: a call counts the references of each of them, up and
+    down again, which takes longer than a few multiplications.
+    """
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: Callable[..., Any], *, forceinline: bool = False) -> Callable[..., Any]:
     others = getattr(config, "CACHE_DIR")  # noqa: B009  # numba makes its settings' names at run time
     setattr(config, "CACHE_DIR", str(cache_folder()))  # noqa: B010
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy", forceinline=forceinline)(function)
     finally:
         setattr(config, "CACHE_DIR", others)  # noqa: B010

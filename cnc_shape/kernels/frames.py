@@ -20,16 +20,16 @@ ALONG_Z = 1e-6  # -, sine of the angle to z below which a path runs along it
 
 # What a frame keeps from one sample to the next
 TANGENT, NORMAL, TURN, MEAN_TURN = 0, 3, 6, 9  # three numbers each
-MEAN_SQUARE, MEAN_STEP, MOVING, KNOWN, CURVED = 12, 13, 14, 15, 16
-FRAME_SIZE = 17
+MEAN_SQUARE, MEAN_STEP, MOVING, CURVED = 12, 13, 14, 15
+FRAME_SIZE = 16
 
 
 @kernel
 def transported(normal, before, after):
     """Turn `normal` (3,) in place by the smallest rotation from one tangent (3,) to another."""
-    sum_ = 1.0 + before[0] * after[0] + before[1] * after[1] + before[2] * after[2]
-    if sum_ > 1e-12:  # else the path turns back, and the normal may stay
-        share = (normal[0] * after[0] + normal[1] * after[1] + normal[2] * after[2]) / sum_
+    divisor = 1.0 + before[0] * after[0] + before[1] * after[1] + before[2] * after[2]
+    if divisor > 1e-12:  # else the path turns back, and the normal may stay
+        share = (normal[0] * after[0] + normal[1] * after[1] + normal[2] * after[2]) / divisor
         for a in range(3):
             normal[a] -= share * (before[a] + after[a])
 
@@ -105,7 +105,7 @@ def path_frames(velocity, acceleration, period, still, share, frame, frames):
             upright(normal, now)
             for a in range(3):
                 tangent[a] = now[a]
-            frame[MOVING] = frame[KNOWN] = 1.0
+            frame[MOVING] = 1.0
         else:
             frame[MOVING] = 0.0
         for a in range(3):

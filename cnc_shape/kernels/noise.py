@@ -20,7 +20,7 @@ UNIT = 2.0**-53  # a word's upper 53 bits as a share of 1
 
 @kernel
 def mixed(word):
-    """Finaliser of SplitMix64: every bit of a uint64 sways every bit of the result."""
+    """Finaliser of SplitMix64: every bit of a uint64 affects every bit of the result."""
     word = (word ^ (word >> np.uint64(30))) * FIRST
     word = (word ^ (word >> np.uint64(27))) * SECOND
     return word ^ (word >> np.uint64(31))

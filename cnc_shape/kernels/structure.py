@@ -34,7 +34,7 @@ class Varying(NamedTuple):
 
 
 @kernel
-def swung(varying, j, mode, position, d, w, start, slope, fading, time):
+def mode_after(varying, j, mode, position, d, w, start, slope, fading, time):
     """Deflection and its rate, from `d` and `w`, of a mode with a table after its axis `j` has pushed it.
 
     varying: a `Varying`; position (d,): where all axes stand as the table sees them. The axis accelerates by
@@ -42,15 +42,15 @@ def swung(varying, j, mode, position, d, w, start, slope, fading, time):
     """
     watched, participation = varying.watched[j, mode], varying.participation[j, mode]
     place = position[watched] if watched >= 0 else 0.0
-    omega, zeta = standing(varying.table, varying.rows[j, mode, 0], varying.rows[j, mode, 1], place)
-    return swing(
+    omega, zeta = table_at(varying.table, varying.rows[j, mode, 0], varying.rows[j, mode, 1], place)
+    return advance(
         d, w, omega, zeta, -participation * start, -participation * slope, -participation * fading,
         varying.rate[j], time,
     )  # fmt: skip
 
 
 @kernel
-def standing(table, first, last, position):
+def table_at(table, first, last, position):
     """Omega (rad/s) and zeta at `position`: linear between rows `first` to `last` - 1 of `table`.
 
     table (p,3): position, increasing within these rows, omega and zeta; as at its ends beyond them.
@@ -73,7 +73,7 @@ def standing(table, first, last, position):
 
 
 @kernel
-def swing(d, w, omega, zeta, start, slope, fading, rate, time):
+def advance(d, w, omega, zeta, start, slope, fading, rate, time):
     """Deflection and its rate, from `d` and `w`, after `time` (s) of a push; see the head of this file.
 
     omega (rad/s) above 0, zeta in [0, 1), rate (1/s) at least 0.

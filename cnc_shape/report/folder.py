@@ -170,8 +170,8 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
     }
     if context.shapers:
         drawn["shapers"] = shaper_figure(context.shapers, context.modes)
-        if wandering := modes_over_position(context.shapers, context.modes):
-            drawn["modes"] = position_figure(wandering)
+        if varying := modes_over_position(context.shapers, context.modes):
+            drawn["modes"] = position_figure(varying)
     return drawn
 
 

@@ -86,9 +86,7 @@ class Place:
     line: int
     error: float  # mm, of the tool
     drive_error: float  # mm, of the drives at the same time
-    first_error: (
-        float | None
-    )  # mm, the largest on this line of the case that this one is compared with, or none
+    first_error: float | None  # mm, the largest on this line of the case compared with; None: no sample there
     exact: bool  # whether every sample of that case was there to find it
     time: float  # s
     foot: FloatArray  # (3,) mm, on the path

@@ -15,6 +15,8 @@ from cnc_shape.units import TWO_PI
 
 PLACES = 1001  # at which a mode is looked at, beside the rows of its table
 
+Band = tuple[float, float | None]  # Hz, lower and upper end; None: without end
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ModeOverPosition:
@@ -26,9 +28,7 @@ class ModeOverPosition:
     frequency: FloatArray  # (p,) Hz
     damping_ratio: FloatArray  # (p,)
     vibration: FloatArray  # (p,) -, V that the shaper leaves there; 1 without a shaper
-    band: (
-        tuple[float, float | None] | None
-    )  # Hz, where V stays small at the damping of the design; None: nowhere
+    band: Band | None  # where V stays small at the damping of the design; None: nowhere
 
     @property
     def deviation(self) -> tuple[float, float]:

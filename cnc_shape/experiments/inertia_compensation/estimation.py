@@ -45,14 +45,13 @@ def estimate_error(trial: Trial, bandwidth: float, delay: float = 0.0) -> float:
 
     delay s: by how much the estimate is taken later than the load.
     """
-    response = lap(trial, observed(bandwidth)).response
-    motors, period = response.motors, trial.circle.sample_time
-    assert motors is not None
+    found, period = lap(trial, observed(bandwidth)), trial.circle.sample_time
+    motors = found.motors
     pitch, viscous, coulomb = (
         frozen(column)
         for column in zip(*((m.pitch, m.viscous, m.coulomb) for m in trial.motors), strict=True)
     )
-    angle = response.joint / pitch
+    angle = found.response.joint / pitch
     speed = (np.vstack([angle[1:], angle[-1:]]) - np.vstack([angle[:1], angle[:-1]])) / (2.0 * period)
     borne = motors.load + viscous * speed + coulomb * np.sign(speed)
     late = round(delay / period)
@@ -119,8 +118,7 @@ def identification_table() -> Table:
         for share in TRUE
     ]  # fmt: skip
     peak = float(np.abs(shuttle().acceleration).max()) / MOTOR.pitch
-    motors = lap(LOADED, IDENTIFYING).response.motors
-    assert motors is not None
+    motors = lap(LOADED, IDENTIFYING).motors
     rows += [
         Row("true inertia 1, a load in phase with the acceleration", "-", None,
             identified(1.0, in_phase()), 5e-4,

@@ -8,19 +8,19 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.experiments.inertia_compensation.better import COMPARED, over_variants, unaware, variants
+from cnc_shape.experiments.inertia_compensation.loads import PEAK
 from cnc_shape.experiments.inertia_compensation.methods import NONE, OURS, PAPER
+from cnc_shape.experiments.inertia_compensation.readings import SEEN
 from cnc_shape.experiments.inertia_compensation.rig import (
     INERTIA,
     LOADED,
     UNLOADED,
-    Lap,
     errors,
     lap,
 )
 from cnc_shape.experiments.inertia_compensation.studies import AMPLITUDES, SWEPT, loaded
 from cnc_shape.program import XYZ
 from cnc_shape.report.style import COLOURS, PATH_COLOUR, WIDTH, look, new_figure, styled
-from cnc_shape.response import MotorSignals
 from cnc_shape.units import MICROMETRE
 
 if TYPE_CHECKING:
@@ -28,12 +28,7 @@ if TYPE_CHECKING:
 
 TOGETHER: Final = 16  # samples
 LAST: Final = 19.0  # s
-DRIFT: Final = 0.32  # of a method's place, over which its variants are spread
-
-
-def _motors(found: Lap) -> MotorSignals:
-    assert found.response.motors is not None
-    return found.response.motors
+SPREAD: Final = 0.32  # of a method's place, over which its variants are spread
 
 
 def _time(values: FloatArray, every: int = 1) -> FloatArray:
@@ -49,7 +44,7 @@ def _highest(values: FloatArray) -> FloatArray:
 def disturbance_torque() -> Figure:
     """Fig. 6: the load of every axis and what the observer makes of it."""
     figure, panels = new_figure(WIDTH, 4.8, 3, 1, sharex=True, sharey=True)
-    motors = _motors(lap(LOADED, PAPER))
+    motors = lap(LOADED, PAPER).motors
     for column, axes in enumerate(panels):
         load, seen = motors.load[::4, column], motors.estimate[::4, column]
         axes.plot(_time(load, 4), load, color=PATH_COLOUR, linewidth=3.0, alpha=0.5, label="injected")
@@ -91,13 +86,13 @@ def contour_errors() -> Figure:
 def gain_and_inertia() -> Figure:
     """Beyond the paper: what the compensation sees and does."""
     figure, panels = new_figure(WIDTH, 5.2, 3, 1, sharex=True)
-    motors = _motors(lap(LOADED, PAPER))
+    motors = lap(LOADED, PAPER).motors
     inertia = motors.effective_inertia / INERTIA
     for column, name in enumerate(XYZ):
         style = look(column, 1.0)
         panels[0].plot(_time(inertia[::4], 4), inertia[::4, column], **style, label=name)
         panels[1].plot(_time(inertia[::4], 4), motors.gain_ratio[::4, column], **style, label=name)
-        felt = np.where(np.abs(motors.estimate[:, column]) > 0.5, motors.agreement[:, column], np.nan)
+        felt = np.where(np.abs(motors.estimate[:, column]) > SEEN, motors.agreement[:, column], np.nan)
         panels[2].plot(_time(inertia[::4], 4), felt[::4], **style, label=name)
     panels[0].set_ylabel("Ĵ over J (-)")
     panels[0].set_title("Effective inertia that the load looks like")
@@ -115,16 +110,16 @@ def load_sweep() -> Figure:
     figure, (sweep, spread) = new_figure(WIDTH, 3.7, 1, 2)
     for k, (name, control) in enumerate(SWEPT.items()):
         rms = [errors(loaded(share), control)[0] for share in AMPLITUDES]
-        torque = 2.5 * np.array(AMPLITUDES)
+        torque = PEAK * np.array(AMPLITUDES)
         sweep.plot(torque, rms, **look(k, 1.3), marker="o", markersize=3.0, label=name)
     sweep.set(xlim=(0.0, 5.1), ylim=(0.0, None), xlabel="largest load (N m)", ylabel="RMS (µm)")
     sweep.set_title("Burst of growing torque")
     sweep.legend(loc="upper left")
     for k, control in enumerate(COMPARED.values()):
         found = [errors(trial, unaware(control, rougher))[0] for trial, rougher in variants()]
-        place = k + DRIFT * np.linspace(-1.0, 1.0, len(found))
+        place = k + SPREAD * np.linspace(-1.0, 1.0, len(found))
         spread.plot(place, found, "o", color=COLOURS[k], markersize=3.0)
-        worst = over_variants(control)[1]
+        worst = over_variants(control).worst_rms
         spread.annotate(
             f"{worst:.2f}", (k, worst), xytext=(0.0, 4.0), textcoords="offset points", ha="center"
         )

@@ -8,6 +8,7 @@ import numpy as np
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.experiments.experiment import Row, Table
+from cnc_shape.experiments.inertia_compensation.loads import PEAK
 from cnc_shape.experiments.inertia_compensation.methods import AS_PRINTED, NONE, PAPER, STIFF
 from cnc_shape.experiments.inertia_compensation.rig import (
     INERTIA,
@@ -28,11 +29,8 @@ SEEN: Final = 0.5  # N m of observed torque from which on the agreement is looke
 
 def readings_table() -> Table:
     """Eqs (1)-(17): contradictions, and what they cost where they are taken at their word."""
-    circle = LOADED.circle
-    centripetal = circle.feed_rate**2 / circle.radius / MOTOR.pitch
-    load = lap(LOADED, PAPER).response.motors
-    assert load is not None
-    agreed = load.agreement[np.abs(load.estimate) > SEEN]
+    motors = lap(LOADED, PAPER).motors
+    agreed = motors.agreement[np.abs(motors.estimate) > SEEN]
     printed = {name: errors(LOADED, control) for name, control in AS_PRINTED.items()}
     return Table(
         "Eqs 1 to 17: what they say, and how they are read",
@@ -43,9 +41,9 @@ def readings_table() -> Table:
                 "and fed forward it doubles the error; eq 1 has it right, the load opposes the motor"),
             Row("eq 7: load torque over acceleration", "kg m²", None, _over_acceleration(), SHOWN,
                 f"{_over_acceleration() / INERTIA:.0f} times the inertia there is: at 1 m/min the motors "
-                f"accelerate at {centripetal:.1f} rad/s², which takes {1e3 * INERTIA * centripetal:.1f} "
-                "mN m against 2.5 N m of load. ∫T dt / a has the unit of an inertia times a second; it "
-                "is ∫T dt / ∫a dt"),
+                f"accelerate at {_centripetal():.1f} rad/s², which takes "
+                f"{1e3 * INERTIA * _centripetal():.1f} mN m against 2.5 N m of load. ∫T dt / a has the unit "
+                "of an inertia times a second; it is ∫T dt / ∫a dt"),
             Row("eq 9: displacement by α ∫T dt, largest of an axis", "µm", None, _open_loop(), 0.5,
                 f"with α = {SLOPE:.2f} rad/s per N m; the axes are displaced by {_displaced():.1f} µm at "
                 "most: eq 8 leaves out the loops. It is read as what the closed loop yields to the "
@@ -78,17 +76,20 @@ def readings_table() -> Table:
     )  # fmt: skip
 
 
+def _centripetal() -> float:
+    """Acceleration of the motors on the circle, rad/s^2."""
+    circle = LOADED.circle
+    return circle.feed_rate**2 / circle.radius / MOTOR.pitch
+
+
 def _over_acceleration() -> float:
     """Largest load over the acceleration of the motors, kg m^2."""
-    circle = LOADED.circle
-    return 2.5 / (circle.feed_rate**2 / circle.radius / MOTOR.pitch)
+    return PEAK / _centripetal()
 
 
 def _open_loop() -> float:
     """Largest displacement that eq 9 makes of the loads, µm."""
-    motors = lap(LOADED, NONE).response.motors
-    assert motors is not None
-    turned = SLOPE * np.cumsum(motors.load, axis=0) * LOADED.circle.sample_time
+    turned = SLOPE * np.cumsum(lap(LOADED, NONE).motors.load, axis=0) * LOADED.circle.sample_time
     return float(np.abs(turned).max()) * MOTOR.pitch / MICROMETRE
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
@@ -16,7 +17,7 @@ from cnc_shape.experiments.inertia_compensation.time_law import TiltedCircle, co
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine, ServoMotor, VelocityLoop
 from cnc_shape.program import XYZ
-from cnc_shape.response import Response
+from cnc_shape.response import MotorSignals, Response
 from cnc_shape.simulation import simulate
 from cnc_shape.units import MICROMETRE
 
@@ -71,6 +72,13 @@ class Lap:
     distance: FloatArray = field(repr=False)  # (n,) mm, contour error, start and stop included
 
     @property
+    def motors(self) -> MotorSignals:
+        """What the motors of the axes did."""
+        motors = self.response.motors
+        assert motors is not None
+        return motors
+
+    @property
     def rms(self) -> float:
         """Contour error over all samples, µm."""
         return float(np.sqrt(np.mean(self.distance**2))) / MICROMETRE
@@ -93,6 +101,7 @@ def run(trial: Trial, control: Control) -> Lap:
 UNLOADED: Final = Trial()
 LOADED: Final = UNLOADED.under(BURST_LOAD)
 PULSED: Final = UNLOADED.under(PULSE_LOAD)
+LOADS: Final[Mapping[str, Trial]] = {"the burst": LOADED, "three pulses": PULSED, "no load": UNLOADED}
 
 
 @cache
@@ -110,6 +119,4 @@ def errors(trial: Trial, control: Control) -> tuple[float, float]:
 
 def ripple(found: Lap) -> float:
     """Standard deviation of what the torque changes by from sample to sample, N m."""
-    motors = found.response.motors
-    assert motors is not None
-    return float(np.diff(motors.torque, axis=0).std())
+    return float(np.diff(found.motors.torque, axis=0).std())

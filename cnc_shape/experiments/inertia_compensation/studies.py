@@ -105,7 +105,7 @@ def circles_table() -> Table:
     rows: list[Row] = []
     for radius, feed in CIRCLES:
         circle = TiltedCircle(radius=radius, feed_rate=feed * MM_PER_MIN)
-        trial = replace(LOADED, circle=circle, disturbances=load(_within(circle)))
+        trial = replace(LOADED, circle=circle, disturbances=load(stretched_burst(circle)))
         rows += [
             error_row(f"R {radius:g} mm, {1e-3 * feed:g} m/min: {name}", trial, control)
             for name, control in ACROSS.items()
@@ -119,7 +119,7 @@ def circles_table() -> Table:
     )
 
 
-def _within(circle: TiltedCircle) -> SineBurst:
-    """The burst at the same part of a lap."""
+def stretched_burst(circle: TiltedCircle) -> SineBurst:
+    """The burst at the same part of another circle's lap."""
     share = circle.duration / UNLOADED.circle.duration
     return SineBurst(BURST.frequency / share, BURST.length * share, BURST.centre * share)

@@ -12,8 +12,8 @@ from cnc_shape.experiments.inertia_compensation.methods import METHODS, NONE, PA
 from cnc_shape.experiments.inertia_compensation.readings import readings_table
 from cnc_shape.experiments.inertia_compensation.rig import (
     LOADED,
+    LOADS,
     MOTOR,
-    PULSED,
     SHOWN,
     UNLOADED,
     errors,
@@ -83,13 +83,6 @@ def circle_table() -> Table:
         "0.25 s, predicted 2.53 and 9.57 µm; after a sweep they became deadband over inertia and 1 s, "
         "for reasons told with the method. RMS and largest are whole laps with start and stop.",
     )  # fmt: skip
-
-
-LOADS: Final = {
-    "the burst": LOADED,
-    "three pulses": PULSED,
-    "no load": UNLOADED,
-}
 
 
 def method_table(name: str) -> Table:

@@ -1,4 +1,4 @@
-"""Growth: how far gains may go before a loop is no longer stable.
+"""Gain limits: how far gains may go before a loop is no longer stable.
 
 By bisection with the poles; by the frequency response at once where delays make too many of them.
 """
