@@ -36,11 +36,10 @@ from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
 from cnc_shape.motors import DutyTally, MotorDuty, duties, servo_motors, tally_duty
 from cnc_shape.recording import Outline, Recorder, Signals
-from cnc_shape.servo import settling_time
+from cnc_shape.servo import loop_reach
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.simulation import SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
-from cnc_shape.windows import foot_reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +155,7 @@ class Trial:
         self._joints = joints.names
         self._limits = np.array([motor.torque_limit for motor in servo_motors(joints).values()])
         self._duty: DutyTally | None = None
-        reach = foot_reach(settling_time(joints, case.control), self._longer, period)
+        reach = loop_reach(joints, case.control, self._longer, case.disturbances.loads)
         self._simulate = simulating(machine, case.control, kinematics, reach, case.disturbances)
         self._measure = measuring(reach)
         self._shaped: CommandState | None = None

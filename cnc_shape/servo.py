@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -23,12 +24,16 @@ from cnc_shape.controllers import (
 from cnc_shape.controllers.compensation import WATCHING
 from cnc_shape.controllers.loop import Command, Memory, Poses, Terms, servo_loop
 from cnc_shape.controllers.motor_loop import MotorMemory
-from cnc_shape.disturbances import EncoderNoise
+from cnc_shape.controllers.servo_model import ratio_bounds
+from cnc_shape.disturbances import EncoderNoise, LoadTorque
 from cnc_shape.joints import Joints, joints_of
 from cnc_shape.kernels.foot_point import PathTable
-from cnc_shape.machine import IdealDrive, Machine
+from cnc_shape.machine import IdealDrive, Machine, ServoMotor
 from cnc_shape.plant import Plant, discretise
+from cnc_shape.program import ROTARY
+from cnc_shape.windows import Reach, foot_reach
 
+MOST_PUSHED = 100.0  # mm, by which loads may widen the window of foot points
 SLOWEST_LOOP = 2.5  # s, time constant beyond which the window of foot points grows no more
 _NOTHING = frozen([])
 NO_PATH = PathTable(
@@ -178,3 +183,23 @@ def settling_time(joints: Joints, control: Control) -> float:
     lags = any(not isinstance(drive.drive, IdealDrive) for drive in joints.drives)
     slowest = min(control.joint_gains, default=control.position_gain)
     return min(1.0 / slowest, SLOWEST_LOOP) if lags else 0.0
+
+
+def pushed_aside(joints: Joints, control: Control, loads: Sequence[LoadTorque]) -> float:
+    """How far loads may push the joints, mm: what motors yield to all of them at once, without integral."""
+    torque, ratio = sum(abs(load.peak) for load in loads), ratio_bounds(control)[0]
+    gains = control.joint_gains or (control.position_gain,) * len(joints.drives)
+    yielding = [
+        drive.pitch * torque / (drive.believed_inertia * drive.velocity_loop.bandwidth * ratio * gain)
+        for joint, gain in zip(joints.drives, gains, strict=True)
+        if isinstance(drive := joint.drive, ServoMotor) and joint.name not in ROTARY
+    ]
+    return min(max(yielding, default=0.0), MOST_PUSHED)
+
+
+def loop_reach(
+    joints: Joints, control: Control, longest: float = 0.0, loads: Sequence[LoadTorque] = ()
+) -> Reach:
+    """Reach of the windows in which a loop's samples find their foot points; longest: of the shapers, s."""
+    pushed = pushed_aside(joints, control, loads)
+    return foot_reach(settling_time(joints, control), longest, control.sample_time, pushed)

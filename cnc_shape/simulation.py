@@ -36,11 +36,11 @@ from cnc_shape.refusals import (
 )
 from cnc_shape.response import Response, motor_signals
 from cnc_shape.segments import path_table
-from cnc_shape.servo import NO_POSES, UNLOADED, PathWindows, Ticks, make_loop, settling_time, structure_of
+from cnc_shape.servo import NO_POSES, UNLOADED, PathWindows, Ticks, loop_reach, make_loop, structure_of
 from cnc_shape.simulation_state import SimulationState, copied_state
 from cnc_shape.toolpath import Toolpath
 from cnc_shape.trajectory import Trajectory, join_trajectories
-from cnc_shape.windows import Reach, Windows, foot_reach, windowing
+from cnc_shape.windows import Reach, Windows, windowing
 
 RESIDUAL_PERIODS = 10.0  # of the slowest mode, watched after the end
 SHORTEST_RESIDUAL_TIME = 0.5  # s
@@ -90,7 +90,7 @@ def simulating(
         machine,
         control,
         joints,
-        reach or foot_reach(settling_time(joints, control), 0.0, control.sample_time),
+        reach or loop_reach(joints, control, loads=disturbances.loads),
         disturbances,
     ).step
 

@@ -23,13 +23,12 @@ from cnc_shape.motion import Block
 from cnc_shape.pipeline import Deviation, deviation
 from cnc_shape.program import ROTARY
 from cnc_shape.response import Response
-from cnc_shape.servo import settling_time
+from cnc_shape.servo import loop_reach
 from cnc_shape.shapers.analysis import contour_factor
 from cnc_shape.shapers.command_shaping import CommandShaping, CommandState, command_shaping
 from cnc_shape.shapers.shaper import NONE as UNSHAPED
 from cnc_shape.simulation import SimulationState, simulating
 from cnc_shape.timing import PLAIN, Timing
-from cnc_shape.windows import foot_reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +186,7 @@ class ModelTrial:
         self._longer = self._how.longer(axes, period)
         self._shape = command_shaping(self._how, axes, period)
         kinematics = self._setup.kinematics
-        reach = foot_reach(settling_time(joints_of(machine, kinematics), self._control), self._longer, period)
+        reach = loop_reach(joints_of(machine, kinematics), self._control, self._longer)
         self._simulate = [
             simulating(off_by(machine, model), self._control, kinematics, reach) for model in self._models
         ]

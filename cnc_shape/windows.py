@@ -6,6 +6,7 @@ the one it has `ahead` samples on. A position loop of gain Kp follows what it wa
 window of fixed length would do at constant feed only: at a corner, where a machine creeps, it would reach
 around to the next side, and on a raster across to the neighbouring line, and find a small distance to a
 place that the tool is not due at. In time it shrinks where the machine slows down.
+What loads may push the drives along the path knows no time, and is added in mm.
 """
 
 from __future__ import annotations
@@ -35,13 +36,14 @@ class Reach:
     margin: float  # mm, added on both sides
 
 
-def foot_reach(settling: float, longest: float, sample_time: float) -> Reach:
+def foot_reach(settling: float, longest: float, sample_time: float, pushed: float = 0.0) -> Reach:
     """How far a sample's foot point may be from its own place on the path.
 
-    settling: time constant of the position loop, s, 0 for ideal drives; longest: of the shapers' delays, s.
+    settling: time constant of the position loop, s, 0 for ideal drives; longest: of the shapers' delays, s;
+    pushed: how far loads may push the drives along the path, mm.
     """
     back, ahead = LOOPS_BACK * settling + longest, LOOPS_AHEAD * settling + longest
-    return Reach(ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1, MARGIN)
+    return Reach(ceil(back / sample_time) + 1, ceil(ahead / sample_time) + 1, MARGIN + pushed)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

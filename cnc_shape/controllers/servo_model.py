@@ -73,7 +73,7 @@ def at_ratio(control: Control, ratio: float) -> Control:
 
 def gain_ratios(drives: Sequence[Drive], control: Control) -> tuple[float, ...]:
     """Ratios of the velocity gains at which a loop is looked at: first 1 where it starts there."""
-    low, high = _ratio_bounds(control)
+    low, high = ratio_bounds(control)
     if low == high or not _any_motor(drives):
         return (low if _any_motor(drives) else 1.0,)
     steps = [float(ratio) for ratio in np.geomspace(low, high, BETWEEN + 1)]
@@ -85,7 +85,7 @@ def held_apart(drives: Sequence[Drive], control: Control) -> list[Control]:
     """Hold the velocity gains where they start, and where they may come to at least and at most."""
     if not _any_motor(drives):
         return [control]
-    ratios = dict.fromkeys((gain_ratios(drives, control)[0], *_ratio_bounds(control)))
+    ratios = dict.fromkeys((gain_ratios(drives, control)[0], *ratio_bounds(control)))
     return [at_ratio(control, ratio) for ratio in ratios]
 
 
@@ -157,7 +157,7 @@ def torque_transfer(motor: ServoMotor, control: Control, z: Complex) -> Complex:
     return np.asarray(answer * angle / z, dtype=np.complex128)
 
 
-def _ratio_bounds(control: Control) -> tuple[float, float]:
+def ratio_bounds(control: Control) -> tuple[float, float]:
     """Lowest and highest ratio that the velocity gain may come to, 1 where nothing moves it."""
     term = control.inertia_compensation
     if term is None:
