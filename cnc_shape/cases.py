@@ -55,10 +55,12 @@ def pick_cases(setup: Setup, names: Sequence[str], slowdown: Slowdown | None = N
     Raises
     ------
     OptionError
-        A name that this machine has no case for.
+        A name that this machine has no case for, or one twice.
     """
     known = _known(setup)
-    for name in names:
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise OptionError(f"the case {name!r} is named twice", hint="name every row once")
         if name not in known:
             raise OptionError(f"this machine has no case called {name!r}", hint="it has " + ", ".join(known))
     return tuple(_case(setup, name, known[name], slowdown) for name in names)

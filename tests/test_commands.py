@@ -114,6 +114,7 @@ def test_simulate_reads_standard_input(place):
         (["simulate", "absent.nc"], "absent.nc: error: cannot read"),
         (["simulate", "."], "error: cannot read: is a directory"),
         (["simulate", "part.nc", "--cases", "shaped,nonsense"], "no case called 'nonsense'"),
+        (["simulate", "part.nc", "--cases", "shaped,unshaped,shaped"], "the case 'shaped' is named twice"),
         (["simulate", "part.nc", "--fail-on", "max_contour_um"], "is no condition"),
         (["simulate", "part.nc", "--fail-on", "speed>3"], "no measure 'speed'"),
         (["simulate", "part.nc", "--figures", "gif"], "svg, png, pdf, not 'gif'"),
