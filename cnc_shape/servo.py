@@ -186,11 +186,16 @@ def settling_time(joints: Joints, control: Control) -> float:
 
 
 def pushed_aside(joints: Joints, control: Control, loads: Sequence[LoadTorque]) -> float:
-    """How far loads may push the joints, mm: what motors yield to all of them at once, without integral."""
+    """How far loads may push the joints, mm: what motors yield to all of them at once, without integral.
+
+    A load beyond a motor's torque limit takes it along.
+    """
     torque, ratio = sum(abs(load.peak) for load in loads), ratio_bounds(control)[0]
     gains = control.joint_gains or (control.position_gain,) * len(joints.drives)
     yielding = [
         drive.pitch * torque / (drive.believed_inertia * drive.velocity_loop.bandwidth * ratio * gain)
+        if torque < drive.torque_limit
+        else MOST_PUSHED
         for joint, gain in zip(joints.drives, gains, strict=True)
         if isinstance(drive := joint.drive, ServoMotor) and joint.name not in ROTARY
     ]
