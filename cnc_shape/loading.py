@@ -5,11 +5,11 @@ a sample and holds until the next; the profile goes on from tick to tick. Before
 no direction, and its loads do not act; at rest the last one holds.
 
 The frame of an analytic command comes from its velocity and acceleration. A replayed command was given by
-positions, rounded to some digits: its acceleration is mostly rounding. There the turning of the tangent goes
-through two exponential windows of `WINDOW` s, one after the other, which reach into the past alone, and is
-taken for a curve where it agrees over the second one. On a plane curve that costs nothing but its first two
-windows, as the normal is set upright on the tangent of the very sample; on others the normal turns late by
-as much.
+positions, rounded to some digits: its acceleration is mostly rounding, and is so still once it is shaped.
+There the turning of the tangent goes through two exponential windows of `WINDOW` s, one after the other,
+which reach into the past alone, and is taken for a curve where it agrees over the second one. On a plane
+curve that costs nothing but its first two windows, as the normal is set upright on the tangent of the very
+sample; on others the normal turns late by as much.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from cnc_shape.trajectory import Trajectory
 
 WINDOW = 0.01  # s, of the turning of a replayed command
 STILL = 1e-3  # mm/s, up to which a command rests
-STILL_REPLAYED = 0.1  # mm/s: slower, the rounding of its positions says more than the path does
+STILL_ROUNDED = 0.1  # mm/s: slower, the rounding of its positions says more than the path does
 
 SPACE = ("x", "y", "z")
 ROWS = {PathDirection.TANGENT: 0, PathDirection.NORMAL: 1, PathDirection.BINORMAL: 2}  # of a frame
@@ -65,8 +65,8 @@ class Loading:
             return now, self._torque(now.samples, np.zeros((0, len(self.loads), len(self.axes))))
         frame, frames = now.frame.copy(), np.zeros((rows, 3, 3))
         if any(isinstance(load.direction, PathDirection) for load in self.loads):
-            share = -np.expm1(-self.sample_time / WINDOW) if command.replayed else 0.0
-            still = STILL_REPLAYED if command.replayed else STILL
+            share = -np.expm1(-self.sample_time / WINDOW) if command.rounded else 0.0
+            still = STILL_ROUNDED if command.rounded else STILL
             path_frames(
                 self._space(command.velocity[:rows]), self._space(command.acceleration[:rows]),
                 self.sample_time, still, share, frame, frames,

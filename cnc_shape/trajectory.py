@@ -22,7 +22,7 @@ class Trajectory:
 
     The first sample of a motion is at t = 0; the last is the first at or after its end, at rest. A replayed
     command was given by its positions alone: velocity and acceleration are differences of them. Once shaped
-    it is a sum of interpolants, which know their velocity, and replayed no more.
+    it is a sum of interpolants, which know their velocity, and replayed no more; but rounded it stays.
     """
 
     axes: tuple[str, ...]
@@ -32,6 +32,7 @@ class Trajectory:
     velocity: FloatArray  # (n,d) mm/s or rad/s
     acceleration: FloatArray  # (n,d) mm/s^2 or rad/s^2
     replayed: bool = field(default=False, kw_only=True)  # positions are all that was given
+    rounded: bool = field(default=False, kw_only=True)  # and given to some digits: differences carry noise
 
     def __len__(self) -> int:
         return self.arc_length.size
@@ -46,6 +47,7 @@ class Trajectory:
             self.velocity[rows],
             self.acceleration[rows],
             replayed=self.replayed,
+            rounded=self.rounded,
         )
 
     def resting(self, row: int, samples: int) -> Trajectory:
@@ -54,8 +56,9 @@ class Trajectory:
         still = frozen(np.zeros((samples, position.size)))
         place = frozen(np.full(samples, self.arc_length[row]))
         return Trajectory(
-            self.axes, self.sample_time, place, frozen(still + position), still, still, replayed=self.replayed
-        )
+            self.axes, self.sample_time, place, frozen(still + position), still, still,
+            replayed=self.replayed, rounded=self.rounded,
+        )  # fmt: skip
 
     def late_arc_length(self, first: int, delay: float) -> FloatArray:
         """The place from sample `first` on, `delay` samples ago, linear between samples."""
@@ -141,6 +144,7 @@ def join_trajectories(parts: Sequence[Trajectory]) -> Trajectory:
         frozen(np.concatenate([part.velocity for part in parts])),
         frozen(np.concatenate([part.acceleration for part in parts])),
         replayed=parts[-1].replayed,
+        rounded=parts[-1].rounded,
     )
 
 

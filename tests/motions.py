@@ -73,7 +73,7 @@ def streamed(parts, limits, tolerance=0.01, sample_time=1e-3, most=65536):
     columns = {}
     for kind, values in ((Path, paths), (Profile, profiles), (Trajectory, blocks)):
         for field in fields(kind):
-            if field.name not in ("axes", "path", "cell", "sample_time", "replayed"):
+            if field.name not in ("axes", "path", "cell", "sample_time", "replayed", "rounded"):
                 columns[f"{kind.__name__}.{field.name}"] = np.concatenate(
                     [getattr(v, field.name) for v in values]
                 )

@@ -98,6 +98,7 @@ def resample(path: TimedPath, sample_time: float, *, samples: int) -> tuple[Traj
         velocity=frozen(velocity),
         acceleration=frozen(acceleration),
         replayed=True,
+        rounded=True,
     )
     return trajectory, build_toolpath(path.program)
 

@@ -151,7 +151,7 @@ def compensating(gains: Mapping[str, float], sample_time: float) -> Step:
         place = whole.late_arc_length(first, width / sample_time)
         signals = (frozen(plain - curved) for plain, curved in zip(late, away, strict=True))
         return whole.cut(slice(len(whole) - kept, None)), Trajectory(
-            whole.axes, sample_time, frozen(place), *signals
+            whole.axes, sample_time, frozen(place), *signals, rounded=whole.rounded
         )
 
     return step

@@ -90,7 +90,7 @@ def shaping(
         place = whole.late_arc_length(first, placed.common / sample_time)
         return (
             whole.cut(slice(len(whole) - kept, None)),
-            Trajectory(command.axes, sample_time, frozen(place), *(frozen(signal) for signal in shaped)),
+            Trajectory(command.axes, sample_time, frozen(place), *map(frozen, shaped), rounded=whole.rounded),
         )
 
     return step
