@@ -21,13 +21,13 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, frozen
 from cnc_shape.disturbances import Disturbances, LoadTorque, PathDirection, value
 from cnc_shape.kernels.frames import FRAME_SIZE, path_frames
+from cnc_shape.program import XYZ
 from cnc_shape.trajectory import Trajectory
 
 WINDOW = 0.01  # s, of the turning of a replayed command
 STILL = 1e-3  # mm/s, up to which a command rests
 STILL_ROUNDED = 0.1  # mm/s: slower, the rounding of its positions says more than the path does
 
-SPACE = ("x", "y", "z")
 ROWS = {PathDirection.TANGENT: 0, PathDirection.NORMAL: 1, PathDirection.BINORMAL: 2}  # of a frame
 
 
@@ -88,7 +88,7 @@ class Loading:
     def _space(self, rates: FloatArray) -> FloatArray:
         """The x, y and z of axis rates, (n,3); 0 where the command lacks one."""
         space = np.zeros((rates.shape[0], 3))
-        for column, axis in enumerate(SPACE):
+        for column, axis in enumerate(XYZ):
             if axis in self.axes:
                 space[:, column] = rates[:, self.axes.index(axis)]
         return space
@@ -99,8 +99,8 @@ class Loading:
         for row, load in enumerate(self.loads):
             if isinstance(load.direction, PathDirection):
                 for column, axis in enumerate(self.axes):
-                    if axis in SPACE:
-                        directions[:, row, column] = frames[:, ROWS[load.direction], SPACE.index(axis)]
+                    if axis in XYZ:
+                        directions[:, row, column] = frames[:, ROWS[load.direction], XYZ.index(axis)]
             elif load.direction in self.axes:
                 directions[:, row, self.axes.index(load.direction)] = 1.0
         return directions

@@ -61,6 +61,11 @@ class ServoMotor:
         """What the controllers take the inertia for, kg m^2."""
         return self.inertia if self.nominal_inertia is None else self.nominal_inertia
 
+    @property
+    def velocity_gain(self) -> float:
+        """Torque per speed that the velocity loop asks for at a gain ratio of 1, N m s."""
+        return self.believed_inertia * self.velocity_loop.bandwidth
+
 
 Drive: TypeAlias = IdealDrive | FirstOrderLag | ServoMotor
 

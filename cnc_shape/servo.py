@@ -143,7 +143,7 @@ def make_loop(joints: Joints, control: Control, noise: EncoderNoise | None = Non
         Not one position gain for every joint, or velocity loops that do not tick together.
     """
     drives, period = joints.drives, control.sample_time
-    gains = control.joint_gains or (control.position_gain,) * len(drives)
+    gains = control.gains(len(drives))
     if len(gains) != len(drives):
         raise ValueError(f"{len(gains)=} {len(drives)=}")
     reading = noise or EncoderNoise(0.0)
@@ -191,9 +191,9 @@ def pushed_aside(joints: Joints, control: Control, loads: Sequence[LoadTorque]) 
     A load beyond a motor's torque limit takes it along.
     """
     torque, ratio = sum(abs(load.peak) for load in loads), ratio_bounds(control)[0]
-    gains = control.joint_gains or (control.position_gain,) * len(joints.drives)
+    gains = control.gains(len(joints.drives))
     yielding = [
-        drive.pitch * torque / (drive.believed_inertia * drive.velocity_loop.bandwidth * ratio * gain)
+        drive.pitch * torque / (drive.velocity_gain * ratio * gain)
         if torque < drive.torque_limit
         else MOST_PUSHED
         for joint, gain in zip(joints.drives, gains, strict=True)

@@ -77,7 +77,7 @@ def check_loop(setup: Setup) -> dict[str, float | None]:
 
 def _velocity_loops(drives: Sequence[Drive], control: Control) -> Margins:
     """Worst margins of the servo motors at their torque, over the ratios that their gains may come to."""
-    gains = control.joint_gains or (control.position_gain,) * len(drives)
+    gains = control.gains(len(drives))
     found = [
         servo_margins(drive, replace(control, position_gain=gain), ratio)
         for drive, gain in dict.fromkeys(zip(drives, gains, strict=True))

@@ -29,3 +29,7 @@ class Control:
     inertia_compensation: InertiaCompensation | None = None
     friction_feedforward: FrictionFeedforward | None = None
     inertia_identification: InertiaIdentification | None = None
+
+    def gains(self, joints: int) -> tuple[float, ...]:
+        """Position gain of every joint, 1/s."""
+        return self.joint_gains or (self.position_gain,) * joints

@@ -49,8 +49,6 @@ def follow(gains, j, speed, memory):
 @inlined
 def torque(gains, j, memory):
     """Torque that answers friction, N m. memory (j,) rad/s."""
-    if not gains.acts:
-        return 0.0
     speed = memory[j]
     pushed = gains.numbers[j, VISCOUS] * speed
     if speed > STANDSTILL:

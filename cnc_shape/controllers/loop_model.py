@@ -96,7 +96,7 @@ def loop_model(
     lagging = np.array([lags(drive) for drive in drives], dtype=bool)
     across = (made - tangents[:, :, None] * (tangents[:, None, :] @ made))[:, :, lagging]
     moved = np.sqrt((made[:, :, lagging] ** 2).sum(axis=1))
-    gains = np.array(control.joint_gains or [control.position_gain] * joints, dtype=np.float64)
+    gains = np.array(control.gains(joints), dtype=np.float64)
     known = {drive: _linear(drive, control) for drive in drives if lags(drive)}
     linears = [known[drive] for drive in drives if lags(drive)]
     orders = [drive.held.size for drive in linears]

@@ -49,7 +49,7 @@ def step(
     tick, ticks = memory.clock[0], motors.ticks
     memory.clock[0] += ticks
     displacement = 0.0
-    if compensate.acts:
+    if compensate.law == compensation.TRIGGERED:
         for j in range(speeds.size):
             displacement += (motors.numbers[j, drive.PITCH] * compensated[j, compensation.ANGLE]) ** 2
         displacement = sqrt(displacement)
@@ -94,10 +94,10 @@ def _ticks(
     """
     period, noise, seed = motors.period, motors.noise, motors.seed
     pitch, count = motors.numbers[j, drive.PITCH], motors.numbers[j, drive.COUNT]
-    inertia, believed = motors.numbers[j, drive.TRUE_INERTIA], motors.numbers[j, drive.BELIEVED]
     lag, decay = motors.numbers[j, drive.LAG], motors.numbers[j, drive.DECAY]
-    limit, coulomb = motors.numbers[j, drive.LIMIT], period * motors.numbers[j, drive.COULOMB] / inertia
-    per_torque, drag = period / inertia, 1.0 / (1.0 + period * motors.numbers[j, drive.VISCOUS] / inertia)
+    limit, coulomb = motors.numbers[j, drive.LIMIT], motors.numbers[j, drive.COULOMB]
+    per_torque, drag = motors.numbers[j, drive.PER_TORQUE], motors.numbers[j, drive.DRAG]
+    believed = motors.numbers[j, drive.BELIEVED]
     per_period, believed_per_torque = 1.0 / period, period / believed
     angle, speed, torque = motor[j, drive.ANGLE], motor[j, drive.SPEED], motor[j, drive.TORQUE]
     applied, friction_before = motor[j, drive.ASKED], motor[j, drive.FRICTION]

@@ -35,7 +35,9 @@ COLUMNS = 8
 
 PITCH = 0  # columns of the numbers of a motor: mm or rad of the joint per rad of the motor
 COUNT = 1  # rad, of the encoder; 0: it is exact
-TRUE_INERTIA, VISCOUS, COULOMB, LIMIT = 2, 3, 4, 5  # kg m^2, N m s, N m, N m
+PER_TORQUE = 2  # rad/s per N m, what a torque held for a tick adds to the speed
+DRAG, COULOMB = 3, 4  # factor by which viscous friction slows in a tick, rad/s that Coulomb friction takes
+LIMIT = 5  # N m
 LAG, DECAY = 6, 7  # what is left of a torque error, in the mean over a tick, and at its end
 BELIEVED = 8  # kg m^2, inertia that the controllers take it for
 GAIN, INTEGRAL_RATE = 9, 10  # N m s, velocity gain at a gain ratio of 1; tick over integral time
@@ -93,10 +95,10 @@ def _row(joint: Axis, period: float) -> tuple[float, ...]:
     loop, lag = drive.velocity_loop, drive.current_time_constant
     decay = remaining(lag, period)
     count = TWO_PI / drive.encoder_counts if drive.encoder_counts else 0.0
-    believed = drive.believed_inertia
     return (
-        drive.pitch, count, drive.inertia, drive.viscous, drive.coulomb, drive.torque_limit,
-        lag / period * (1.0 - decay), decay, believed, believed * loop.bandwidth, period / loop.integral_time,
+        drive.pitch, count, period / drive.inertia, 1.0 / (1.0 + period * drive.viscous / drive.inertia),
+        period * drive.coulomb / drive.inertia, drive.torque_limit, lag / period * (1.0 - decay), decay,
+        drive.believed_inertia, drive.velocity_gain, period / loop.integral_time,
     )  # fmt: skip
 
 

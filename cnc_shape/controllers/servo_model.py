@@ -182,7 +182,7 @@ def _gains(motor: ServoMotor, control: Control) -> tuple[float, float]:
     term, loop = control.inertia_compensation, motor.velocity_loop
     ratio = 1.0 if term is None else term.starting_ratio
     stiffening = ratio if term is not None and term.scale_integral_time else 1.0
-    return motor.believed_inertia * loop.bandwidth * ratio, stiffening / loop.integral_time
+    return motor.velocity_gain * ratio, stiffening / loop.integral_time
 
 
 def _motion(motor: ServoMotor, h: float) -> FloatArray:

@@ -161,7 +161,7 @@ def _check(
     alike = len(set(drives)) == 1 and len(set(control.joint_gains)) < 2
     if alike:  # across the path the loop is one joint's under Kp + Kc, whatever the pose
         inverse_jacobians, tangents = inverse_jacobians[:1], tangents[:1]
-    gains = control.joint_gains or (control.position_gain,) * len(drives)
+    gains = control.gains(len(drives))
     for name, drive, gain in zip(names, drives, gains, strict=True):
         if lags(drive):
             _check_joint(name, drive, replace(_uncoupled(control), position_gain=gain))

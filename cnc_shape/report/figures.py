@@ -12,7 +12,7 @@ from cnc_shape.arrays import FloatArray, IntArray
 from cnc_shape.pipeline import Run
 from cnc_shape.program import ROTARY
 from cnc_shape.recording import Signals
-from cnc_shape.report.rows import UNDER, is_mixed, row_names
+from cnc_shape.report.rows import UNDER, folded, is_mixed, row_names
 from cnc_shape.report.style import PATH_COLOUR, WIDTH, look, new_figure, styled
 from cnc_shape.units import MICROMETRE
 
@@ -223,7 +223,7 @@ def _folded(case: str) -> str:
     """Name of a case for a narrow title: its last term on a line of its own, or each if that is too wide."""
     head, plus, tail = case.rpartition("+")
     if len(head) > TITLE:
-        return case.replace("+", "\n+ ")
+        return folded(case)
     return f"{head}\n+ {tail}" if plus else case
 
 
