@@ -33,6 +33,10 @@ class VelocityLoop:
     integral_time: float = 0.01  # s; inf: no integral
     sample_time: float = 2.5e-4  # s
 
+    def ticks(self, sample_time: float) -> int:
+        """Ticks, at least one, in a sample of the position loop (s)."""
+        return max(round(sample_time / self.sample_time), 1)
+
 
 @dataclass(frozen=True, slots=True)
 class ServoMotor:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from cnc_shape.arrays import BoolArray, FloatArray
 from cnc_shape.controllers.control import Control
 from cnc_shape.controllers.loop_model import LoopModel, loop_model, loop_transfer, rows_of
-from cnc_shape.controllers.servo_model import at_ratio, ticks_of, torque_transfer
+from cnc_shape.controllers.servo_model import at_ratio, torque_transfer
 from cnc_shape.machine import Drive, ServoMotor
 
 GRID = 160  # frequencies, evenly on a logarithmic scale up to half the sample rate
@@ -87,7 +87,7 @@ def servo_margins(motor: ServoMotor, control: Control, gain_ratio: float | None 
     where the compensation of `control` starts it.
     """
     control = control if gain_ratio is None else at_ratio(control, gain_ratio)
-    ticks = ticks_of(motor, control.sample_time)
+    ticks = motor.velocity_loop.ticks(control.sample_time)
     period = control.sample_time / ticks
     late = min(ticks * (control.delay_samples + 1), MOST_EVEN)
 

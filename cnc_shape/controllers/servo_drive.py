@@ -77,12 +77,14 @@ def velocity_ticks(joints: Sequence[Axis], sample_time: float) -> tuple[float, i
     ValueError
         As `motors`.
     """
-    own = {joint.drive.velocity_loop.sample_time for joint in joints if isinstance(joint.drive, ServoMotor)}
+    loops = [joint.drive.velocity_loop for joint in joints if isinstance(joint.drive, ServoMotor)]
+    own = {loop.sample_time for loop in loops}
     if len(own) > 1:
         raise ValueError(f"velocity loops tick differently: {sorted(own)}")
-    period = own.pop() if own else sample_time
-    ticks = round(sample_time / period)
-    if ticks < 1 or abs(ticks * period - sample_time) > 1e-9 * sample_time:
+    if not loops:
+        return sample_time, 1
+    period, ticks = loops[0].sample_time, loops[0].ticks(sample_time)
+    if abs(ticks * period - sample_time) > 1e-9 * sample_time:
         raise ValueError(f"{sample_time=} is no multiple of {period=}")
     return sample_time / ticks, ticks
 

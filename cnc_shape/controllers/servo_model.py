@@ -56,11 +56,6 @@ class LinearDrive(NamedTuple):
     held: FloatArray  # (s,)
 
 
-def ticks_of(motor: ServoMotor, sample_time: float) -> int:
-    """Ticks of the velocity loop in a sample of the position loop."""
-    return max(round(sample_time / motor.velocity_loop.sample_time), 1)
-
-
 def at_ratio(control: Control, ratio: float) -> Control:
     """Return the loop with its velocity gain held at a ratio to the nominal one."""
     term = control.inertia_compensation
@@ -96,7 +91,7 @@ def velocity_tick(motor: ServoMotor, control: Control) -> LinearDrive:
     where it acts, the integral; where it is fed forward, the observer: how far it is ahead of the angle, its
     speed and its load.
     """
-    h = control.sample_time / ticks_of(motor, control.sample_time)
+    h = control.sample_time / motor.velocity_loop.ticks(control.sample_time)
     believed, loop, observer = motor.believed_inertia, motor.velocity_loop, _observer(control)
     gain, rate = _gains(motor, control)
     row = np.eye(10)
@@ -130,7 +125,7 @@ def lifted(motor: ServoMotor, control: Control) -> LinearDrive:
     s = tick.held.size
     augmented = np.eye(s + 1)  # the command is a state that stays
     augmented[:s, :s], augmented[:s, s] = tick
-    sample = np.linalg.matrix_power(augmented, ticks_of(motor, control.sample_time))
+    sample = np.linalg.matrix_power(augmented, motor.velocity_loop.ticks(control.sample_time))
     sample[0, 1:s] *= motor.pitch
     sample[1:s, s] /= motor.pitch
     return LinearDrive(frozen(sample[:s, :s]), frozen(sample[:s, s]))
@@ -138,7 +133,7 @@ def lifted(motor: ServoMotor, control: Control) -> LinearDrive:
 
 def torque_transfer(motor: ServoMotor, control: Control, z: Complex) -> Complex:
     """Loop transfer L(z) at the motor's torque, (f,): velocity and position loop; z (f,) is of a tick."""
-    ticks = ticks_of(motor, control.sample_time)
+    ticks = motor.velocity_loop.ticks(control.sample_time)
     h = control.sample_time / ticks
     observer, believed = _observer(control), motor.believed_inertia
     gain, rate = _gains(motor, control)
