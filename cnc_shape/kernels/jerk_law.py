@@ -1,0 +1,340 @@
+"""The time law of a section between two stops under a jerk limit: scans, rounding, certificate.
+
+The scans guess what the acceleration will be when they ask how much jerk the curvature takes, so the
+finished law is looked at: where it asks for more than the limit, the cell and its neighbours may use less in
+the next round. Limits only fall, so this ends; straight cells never ask for too much.
+"""
+# pyright: basic
+
+import numpy as np
+
+from cnc_shape.kernels import kernel
+from cnc_shape.kernels.jerk_certificate import piece_loads
+from cnc_shape.kernels.jerk_rounding import SHORTEST, round_off
+from cnc_shape.kernels.jerk_scan import (
+    LEAST_JERK_SHARE,
+    PHASES,
+    envelope,
+    last_speed,
+    mirrored,
+    moved,
+    scan,
+    time_to,
+)
+from cnc_shape.kernels.speed_limits import ends
+
+POINTS = 9  # of a piece at which the certificate looks
+STRAIGHT_JERK_SHARE = 1e-5  # -, of the jerk limit that the curvature of a straight cell may use
+EASE_ACCELERATION = 0.999  # -, over the excess
+EASE_JERK = 0.99
+
+
+@kernel
+def derivatives(rows, length, first, bend, third):
+    """q' and q'' at both ends (k,2,d), q''' (k,d)."""
+    d = rows.shape[2]
+    for k in range(length.size):
+        ends(rows[k], length[k], first[k, 0], bend[k, 0], first[k, 1], bend[k, 1])
+        for i in range(d):
+            third[k, i] = 6.0 * rows[k, 3, i]
+
+
+@kernel
+def straight_jerk(limit_v2, straight, first, bend, third, jerk, straight_a, straight_b):
+    """Path acceleration and jerk of straight cells; both 0 for those that the jerk limit sees as curved."""
+    for k in range(straight.size):
+        straight_a[k] = straight[k]
+        straight_b[k] = np.inf
+        v = np.sqrt(limit_v2[k, 0])
+        for i in range(jerk.size):
+            if abs(first[k, 0, i]) > 0.0:
+                straight_b[k] = min(straight_b[k], jerk[i] / abs(first[k, 0, i]))
+            curved = abs(third[k, i]) * v**3
+            curved += 3.0 * max(abs(bend[k, 0, i]), abs(bend[k, 1, i])) * v * straight[k]
+            if curved > STRAIGHT_JERK_SHARE * jerk[i]:
+                straight_a[k] = 0.0
+        if straight_a[k] == 0.0:
+            straight_b[k] = 0.0
+
+
+@kernel
+def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease_v, ease_a, ease_j, top, cap):
+    """Highest speeds in the cells and at the nodes, from velocity, feed, curvature and its change."""
+    count = limit_v2.shape[0]
+    cap[0] = 0.0
+    cap[count] = 0.0
+    for k in range(count):
+        top[k] = ease_v[k] * np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1]))
+        if straight_a[k] == 0.0:
+            for i in range(jerk.size):
+                if third[k, i] != 0.0:
+                    top[k] = min(top[k], np.cbrt(ease_j[k] * jerk[i] / abs(third[k, i])))
+    for k in range(1, count):
+        cap[k] = min(top[k - 1], top[k])
+        for side in range(2):
+            c = k - 1 + side
+            if straight_a[c] == 0.0:
+                for i in range(jerk.size):
+                    curvature = abs(bend[c, 1 - side, i])
+                    if curvature != 0.0:
+                        cap[k] = min(cap[k], np.sqrt(ease_a[c] * acceleration[i] / curvature))
+
+
+@kernel
+def falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, phases, cell, count, least):
+    """Jerk (k,) by which the path acceleration may fall in each cell, at the envelope's speed."""
+    speed = np.zeros(least.size)
+    for n in range(count):
+        k = cell[n]
+        speed[k] = max(speed[k], max(phases[n, 2], last_speed(phases, n)))
+    for k in range(least.size):
+        if straight_a[k] > 0.0:
+            least[k] = ease_j[k] * straight_b[k]
+            continue
+        least[k] = np.inf
+        for i in range(jerk.size):
+            for end in range(2):
+                q = first[k, end, i]
+                if q != 0.0:
+                    own = third[k, i] * speed[k] ** 3 * (1.0 if q > 0.0 else -1.0)
+                    room = max(ease_j[k] * jerk[i] + own, LEAST_JERK_SHARE * ease_j[k] * jerk[i])
+                    least[k] = min(least[k], room / abs(q))
+
+
+@kernel
+def cut(law, law_cell, count, nodes, pieces, cell):
+    """Cut the phases of a law at the nodes: pieces of time 0, duration, place in the cell, v, a, b."""
+    m = 0
+    k = 0
+    last = nodes.size - 2
+    for n in range(count):
+        whole = law[n, 0]
+        if whole < SHORTEST:
+            continue
+        place = law[n, 1]
+        v = law[n, 2]
+        a = law[n, 3]
+        b = law[n, 4]
+        end = place + moved(v, a, b, whole)
+        while k < last and nodes[k + 1] <= place:
+            k += 1
+        begin = 0.0
+        offset = max(place - nodes[k], 0.0)
+        while True:
+            inside = k < last and nodes[k + 1] < end
+            until = time_to(v, a, b, whole, nodes[k + 1] - place) if inside else whole
+            if until - begin >= SHORTEST:
+                pieces[m, 0] = 0.0
+                pieces[m, 1] = until - begin
+                pieces[m, 2] = offset
+                pieces[m, 3] = max(v + begin * (a + begin * b / 2.0), 0.0)
+                pieces[m, 4] = a + b * begin
+                pieces[m, 5] = b
+                cell[m] = k
+                m += 1
+            if not inside:
+                break
+            k += 1
+            begin = until
+            offset = 0.0
+    return m
+
+
+@kernel
+def certificate(
+    pieces, cell, count, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, points, worst
+):
+    """Largest ratios (k,4) of velocity, acceleration, jerk and feed to their limits in every cell."""
+    d = rows.shape[2]
+    worst[:] = 0.0
+    for m in range(count):
+        k = cell[m]
+        whole = first_cell + k
+        for n in range(points):
+            e = pieces[m, 1] * n / (points - 1)
+            piece_loads(
+                rows[whole], d, alone[whole],
+                pieces[m, 2] + moved(pieces[m, 3], pieces[m, 4], pieces[m, 5], e),
+                pieces[m, 3] + e * (pieces[m, 4] + e * pieces[m, 5] / 2.0),
+                pieces[m, 4] + e * pieces[m, 5],
+                pieces[m, 5], velocity, acceleration, jerk, feed_rate[whole], worst[k],
+            )  # fmt: skip
+
+
+@kernel
+def tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j):
+    """Lower what cells and their neighbours may use, where the law asked for too much; whether it did."""
+    count = ease_v.size
+    found = 0
+    lower = np.ones((count, 3))
+    for k in range(count):
+        factor = 1.0
+        fast = max(worst[k, 0], worst[k, 3])
+        if fast > 1.0 + tolerances[0]:
+            lower[k, 0] = EASE_ACCELERATION / fast
+        if worst[k, 1] > 1.0 + tolerances[1]:
+            factor = EASE_ACCELERATION / worst[k, 1]
+            lower[k, 1] = factor
+        if worst[k, 2] > 1.0 + tolerances[2]:
+            lower[k, 2] = EASE_JERK / worst[k, 2]
+        if lower[k, 0] < 1.0 or lower[k, 1] < 1.0 or lower[k, 2] < 1.0:
+            found += 1
+    if found > 0:
+        for k in range(count):
+            for near in range(max(k - 1, 0), min(k + 2, count)):
+                ease_v[k] *= lower[near, 0] if near == k else 1.0
+                if straight_a[k] == 0.0 or near == k:
+                    ease_a[k] *= lower[near, 1]
+                    ease_j[k] *= lower[near, 2]
+    return found
+
+
+@kernel
+def section_law(
+    rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, tolerances,
+    most_rounds,
+):  # fmt: skip
+    """Time law of the cells `begin` to `end`, from rest to rest.
+
+    Parameters
+    ----------
+    tolerances (3,)
+        By which velocity and feed, acceleration and jerk may exceed their limits.
+    most_rounds
+        Of lowering limits where they do not.
+
+    Returns
+    -------
+    pieces (m,6), cell (m,)
+        0, duration, place in the cell, v, a, b; the cell counted from `begin`.
+    rounds
+    found
+        Cells that still ask for too much.
+    """
+    count = end - begin
+    d = acceleration.size
+    size = length[begin:end]
+    first = np.empty((count, 2, d))
+    bend = np.empty((count, 2, d))
+    third = np.empty((count, d))
+    derivatives(rows[begin:end], size, first, bend, third)
+    straight_a = np.empty(count)
+    straight_b = np.empty(count)
+    limits = limit_v2[begin:end]
+    straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
+    nodes = np.zeros(count + 1)
+    for k in range(count):
+        nodes[k + 1] = nodes[k] + size[k]
+    back_first = -first[::-1, ::-1].copy()
+    back_bend = bend[::-1, ::-1].copy()
+    back_third = -third[::-1].copy()
+    back_size = size[::-1].copy()
+    own_size = size.copy()
+    back_straight_a = straight_a[::-1].copy()
+    back_straight_b = straight_b[::-1].copy()
+    ease_v = np.ones(count)
+    ease_a = np.ones(count)
+    ease_j = np.ones(count)
+    top = np.empty(count)
+    cap = np.empty(count + 1)
+    least = np.empty(count)
+    rising = np.empty((PHASES * count, 5))
+    falling = np.empty((PHASES * count, 5))
+    upper = np.empty((2 * PHASES * count, 5))
+    rising_cell = np.empty(PHASES * count, np.int64)
+    falling_cell = np.empty(PHASES * count, np.int64)
+    upper_cell = np.empty(2 * PHASES * count, np.int64)
+    law = np.empty((4 * PHASES * count + 4, 5))
+    law_cell = np.empty(4 * PHASES * count + 4, np.int64)
+    pieces = np.empty((4 * PHASES * count + 4 + count, 6))
+    cell = np.empty(4 * PHASES * count + 4 + count, np.int64)
+    worst = np.empty((count, 4))
+    rounds = 0
+    found = 1
+    m = 0
+    while found > 0 and rounds < most_rounds:
+        rounds += 1
+        speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease_v, ease_a, ease_j, top, cap)
+        r = scan(
+            own_size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease_a,
+            ease_j, rising, rising_cell,
+        )  # fmt: skip
+        f = scan(
+            back_size, top[::-1].copy(), cap[::-1].copy(), back_straight_a, back_straight_b, back_first,
+            back_bend, back_third, acceleration, jerk, ease_a[::-1].copy(), ease_j[::-1].copy(), falling,
+            falling_cell,
+        )  # fmt: skip
+        mirrored(falling, falling_cell, f, nodes, count)
+        u = envelope(rising, rising_cell, r, falling, falling_cell, f, nodes, upper, upper_cell)
+        falling_jerk(
+            first, third, straight_a, straight_b, jerk, ease_j, upper, upper_cell, u, least
+        )
+        w = round_off(upper, upper_cell, u, least, law, law_cell)
+        m = cut(law, law_cell, w, nodes, pieces, cell)
+        certificate(
+            pieces, cell, m, rows, begin, feed_rate, alone, velocity, acceleration, jerk, POINTS, worst
+        )
+        found = tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j)
+    return pieces[:m], cell[:m], rounds, found
+
+
+@kernel
+def path_law(
+    rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, tolerances,
+    most_rounds,
+):  # fmt: skip
+    """Time law of a whole path, section by section.
+
+    Returns
+    -------
+    pieces (m,6), cell (m,)
+        0, duration, place in the cell, v, a, b.
+    stuck
+        A cell in a section without a law; -1 if there is none.
+    """
+    count = length.size
+    out = np.empty((4 * count + 64, 6))
+    out_cell = np.empty(4 * count + 64, np.int64)
+    filled = 0
+    stuck = -1
+    begin = 0
+    while begin < count:
+        if dwell[begin] > 0.0 or length[begin] == 0.0:
+            if filled == out_cell.size:
+                out, out_cell = more_room(out, out_cell, 1)
+            out[filled] = 0.0
+            out[filled, 1] = dwell[begin]
+            out_cell[filled] = begin
+            filled += 1
+        end = begin + 1
+        if length[begin] > 0.0:
+            while end < count and not stop[end] and length[end] > 0.0:
+                end += 1
+            pieces, cell, _, found = section_law(
+                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end,
+                tolerances, most_rounds,
+            )  # fmt: skip
+            if found > 0 and stuck < 0:
+                stuck = begin
+            if filled + cell.size > out_cell.size:
+                out, out_cell = more_room(out, out_cell, cell.size)
+            for n in range(cell.size):
+                for column in range(6):
+                    out[filled + n, column] = pieces[n, column]
+                out_cell[filled + n] = begin + cell[n]
+            filled += cell.size
+        begin = end
+    return out[:filled], out_cell[:filled], stuck
+
+
+@kernel
+def more_room(out, out_cell, count):
+    """Return both arrays with room for twice as many pieces, and `count` at least."""
+    size = out_cell.size
+    more = np.empty((2 * size + count, 6))
+    more_cell = np.empty(2 * size + count, np.int64)
+    for n in range(size):
+        for column in range(6):
+            more[n, column] = out[n, column]
+        more_cell[n] = out_cell[n]
+    return more, more_cell
