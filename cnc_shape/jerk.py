@@ -86,9 +86,9 @@ def jerk_violation(profile: Profile, limits: Sequence[Limits], points: int = 129
         Points in each piece, both ends included. The jerk is a polynomial of degree 6 in time there.
     """
     path = profile.path
-    bounds = np.array([
-        [getattr(limit, name) for limit in limits] for name in ("velocity", "acceleration", "jerk")
-    ])
+    bounds = np.array(
+        [[getattr(limit, name) for limit in limits] for name in ("velocity", "acceleration", "jerk")]
+    )
     worst, where = law_excesses(
         profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk, profile.cell,
         path.coefficients, path.length, path.feed_rate, rotary_only(path), path.stop, bounds, points,

@@ -1,10 +1,16 @@
-"""What a time law with jerk asks of the machine, and whether its pieces follow each other."""
+"""What a time law with jerk asks of the machine, and whether its pieces follow each other.
+
+Along a piece the jerk of an axis, ``q' b + 3 q'' v a + q''' v^3``, is a polynomial of degree 6 in time: where
+none of its Bernstein coefficients exceeds the limit, it does not; halving the piece brings them nearer.
+"""
 # pyright: basic
 
 import numpy as np
 
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_scan import moved
+
+SMALLEST_SHARE = 1.0 / 64.0  # -, of a piece that is halved
 
 
 @kernel
@@ -21,10 +27,89 @@ def timed(pieces):
 
 
 @kernel
-def piece_loads(c, d, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, worst):
+def in_bernstein(powers, out):
+    """Bernstein coefficients of degree 6 of a polynomial on [0, 1], from its powers (7,)."""
+    for i in range(7):
+        value = 0.0
+        share = 1.0  # binomial(i, k) over binomial(6, k)
+        for k in range(i + 1):
+            value += share * powers[k]
+            share *= (i - k) / (6.0 - k) if k < 6 else 0.0
+        out[i] = value
+
+
+@kernel
+def jerk_parts(s, v, a, b, t, powers, parts):
+    """Bernstein coefficients (5,7) of s, s^2, v a, s v a and v^3 along a piece; `powers` (5,7) is scratch."""
+    s1 = v * t
+    s2 = a * t * t / 2.0
+    s3 = b * t * t * t / 6.0
+    v1 = a * t
+    v2 = b * t * t / 2.0
+    a1 = b * t
+    powers[:] = 0.0
+    place = (s, s1, s2, s3)
+    speed = (v, v1, v2)
+    for i in range(4):
+        powers[0, i] = place[i]
+        for j in range(4):
+            powers[1, i + j] += place[i] * place[j]
+    for i in range(3):
+        powers[2, i] += speed[i] * a
+        powers[2, i + 1] += speed[i] * a1
+        for j in range(3):
+            for k in range(3):
+                powers[4, i + j + k] += speed[i] * speed[j] * speed[k]
+    for i in range(4):
+        for j in range(4):
+            powers[3, i + j] += place[i] * powers[2, j]
+    for n in range(5):
+        in_bernstein(powers[n], parts[n])
+
+
+@kernel
+def jerk_bound(c, s, v, a, b, t, jerk, enough, powers, parts, waiting):
+    """Bound of the ratio of jerk to its limit along a piece, as near as it takes to tell it from `enough`.
+
+    `waiting` (n,2) is scratch: parts of the piece that are still to be looked at.
+    """
+    found = 0.0
+    waiting[0, 0] = 0.0
+    waiting[0, 1] = 1.0
+    count = 1
+    while count > 0:
+        count -= 1
+        begin = waiting[count, 0]
+        share = waiting[count, 1]
+        e = begin * t
+        here_v = v + e * (a + e * b / 2.0)
+        here_a = a + e * b
+        jerk_parts(s + moved(v, a, b, e), here_v, here_a, b, share * t, powers, parts)
+        bound = 0.0
+        sure = 0.0
+        for i in range(jerk.size):
+            for n in range(7):
+                first = c[1, i] + 2.0 * c[2, i] * parts[0, n] + 3.0 * c[3, i] * parts[1, n]
+                bent = 6.0 * c[2, i] * parts[2, n] + 18.0 * c[3, i] * parts[3, n]
+                load = abs(first * b + bent + 6.0 * c[3, i] * parts[4, n]) / jerk[i]
+                bound = max(bound, load)
+                if n == 0 or n == 6:
+                    sure = max(sure, load)
+        if bound > enough and sure <= enough and share > SMALLEST_SHARE:
+            for half in range(2):
+                waiting[count, 0] = begin + half * 0.5 * share
+                waiting[count, 1] = 0.5 * share
+                count += 1
+        else:
+            found = max(found, bound)
+    return found
+
+
+@kernel
+def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, worst):
     """Raise `worst` (4,) to the ratios of velocity, acceleration, jerk and feed to their limits at a point."""
     square = 0.0
-    for i in range(d):
+    for i in range(velocity.size):
         third = 6.0 * c[3, i]
         bend = 2.0 * c[2, i] + third * s
         first = c[1, i] + s * (2.0 * c[2, i] + 3.0 * c[3, i] * s)
@@ -39,7 +124,19 @@ def piece_loads(c, d, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate
 
 @kernel
 def law_excesses(
-    duration, u, speed, path_acceleration, path_jerk, cell, rows, length, feed_rate, alone, stop, limits, points
+    duration,
+    u,
+    speed,
+    path_acceleration,
+    path_jerk,
+    cell,
+    rows,
+    length,
+    feed_rate,
+    alone,
+    stop,
+    limits,
+    points,
 ):
     """Largest ratios of velocity, acceleration, jerk and feed to their limits; largest gaps between pieces.
 
@@ -55,7 +152,6 @@ def law_excesses(
     worst = np.zeros(7)
     where = np.zeros(7, np.int64)
     here = np.empty(4)
-    d = rows.shape[2]
     for m in range(duration.size):
         k = cell[m]
         here[:] = 0.0
@@ -68,9 +164,7 @@ def law_excesses(
             s = u[m] + moved(speed[m], path_acceleration[m], b, e)
             v = speed[m] + e * (path_acceleration[m] + e * b / 2.0)
             a = path_acceleration[m] + e * b
-            piece_loads(
-                rows[k], d, alone[k], s, v, a, b, limits[0], limits[1], limits[2], feed_rate[k], here
-            )
+            piece_loads(rows[k], alone[k], s, v, a, b, limits[0], limits[1], limits[2], feed_rate[k], here)
         for n in range(4):
             if here[n] > worst[n]:
                 worst[n] = here[n]

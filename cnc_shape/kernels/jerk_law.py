@@ -9,7 +9,7 @@ the next round. Limits only fall, so this ends; straight cells never ask for too
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_certificate import piece_loads
+from cnc_shape.kernels.jerk_certificate import jerk_bound, piece_loads
 from cnc_shape.kernels.jerk_rounding import SHORTEST, round_off
 from cnc_shape.kernels.jerk_scan import (
     LEAST_JERK_SHARE,
@@ -24,6 +24,7 @@ from cnc_shape.kernels.jerk_scan import (
 from cnc_shape.kernels.speed_limits import ends
 
 POINTS = 9  # of a piece at which the certificate looks
+NEAR = 1e-10  # mm or rad, of a node: as good as there
 STRAIGHT_JERK_SHARE = 1e-5  # -, of the jerk limit that the curvature of a straight cell may use
 EASE_ACCELERATION = 0.999  # -, over the excess
 EASE_JERK = 0.99
@@ -103,7 +104,10 @@ def falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, phases, cel
 
 @kernel
 def cut(law, law_cell, count, nodes, pieces, cell):
-    """Cut the phases of a law at the nodes: pieces of time 0, duration, place in the cell, v, a, b."""
+    """Cut the phases of a law at the nodes: pieces of time 0, duration, place in the cell, v, a, b.
+
+    A phase that ends at a node but for rounding ends there. Every cell has a piece, however short it is.
+    """
     m = 0
     k = 0
     last = nodes.size - 2
@@ -111,22 +115,24 @@ def cut(law, law_cell, count, nodes, pieces, cell):
         whole = law[n, 0]
         if whole < SHORTEST:
             continue
+        origin = nodes[law_cell[n]]
         place = law[n, 1]
         v = law[n, 2]
         a = law[n, 3]
         b = law[n, 4]
         end = place + moved(v, a, b, whole)
-        while k < last and nodes[k + 1] <= place:
-            k += 1
+        near = NEAR + 2e-16 * origin
         begin = 0.0
-        offset = max(place - nodes[k], 0.0)
         while True:
-            inside = k < last and nodes[k + 1] < end
-            until = time_to(v, a, b, whole, nodes[k + 1] - place) if inside else whole
-            if until - begin >= SHORTEST:
+            to_node = nodes[k + 1] - origin
+            inside = k < last and to_node < end - near
+            until = begin
+            if not (k < last and to_node <= place + near):
+                until = time_to(v, a, b, whole, to_node - place) if inside else whole
+            if until - begin >= SHORTEST or (inside and (m == 0 or cell[m - 1] != k)):
                 pieces[m, 0] = 0.0
                 pieces[m, 1] = until - begin
-                pieces[m, 2] = offset
+                pieces[m, 2] = 0.0 if begin > 0.0 else max(place - (nodes[k] - origin), 0.0)
                 pieces[m, 3] = max(v + begin * (a + begin * b / 2.0), 0.0)
                 pieces[m, 4] = a + b * begin
                 pieces[m, 5] = b
@@ -136,29 +142,39 @@ def cut(law, law_cell, count, nodes, pieces, cell):
                 break
             k += 1
             begin = until
-            offset = 0.0
     return m
 
 
 @kernel
 def certificate(
-    pieces, cell, count, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, points, worst
+    pieces, cell, count, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, enough, worst
 ):
-    """Largest ratios (k,4) of velocity, acceleration, jerk and feed to their limits in every cell."""
-    d = rows.shape[2]
+    """Largest ratios (k,4) of velocity, acceleration, jerk and feed to their limits in every cell.
+
+    Those of jerk are bounds, as near as it takes to tell them from `enough`; the others are looked for at
+    some points of every piece.
+    """
     worst[:] = 0.0
+    powers = np.empty((5, 7))
+    parts = np.empty((5, 7))
+    waiting = np.empty((64, 2))
     for m in range(count):
         k = cell[m]
         whole = first_cell + k
-        for n in range(points):
-            e = pieces[m, 1] * n / (points - 1)
+        s = pieces[m, 2]
+        v = pieces[m, 3]
+        a = pieces[m, 4]
+        b = pieces[m, 5]
+        t = pieces[m, 1]
+        for n in range(POINTS):
+            e = t * n / (POINTS - 1)
             piece_loads(
-                rows[whole], d, alone[whole],
-                pieces[m, 2] + moved(pieces[m, 3], pieces[m, 4], pieces[m, 5], e),
-                pieces[m, 3] + e * (pieces[m, 4] + e * pieces[m, 5] / 2.0),
-                pieces[m, 4] + e * pieces[m, 5],
-                pieces[m, 5], velocity, acceleration, jerk, feed_rate[whole], worst[k],
+                rows[whole], alone[whole], s + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, b,
+                velocity, acceleration, jerk, feed_rate[whole], worst[k],
             )  # fmt: skip
+        worst[k, 2] = max(
+            worst[k, 2], jerk_bound(rows[whole], s, v, a, b, t, jerk, enough, powers, parts, waiting)
+        )
 
 
 @kernel
@@ -264,16 +280,15 @@ def section_law(
             back_bend, back_third, acceleration, jerk, ease_a[::-1].copy(), ease_j[::-1].copy(), falling,
             falling_cell,
         )  # fmt: skip
-        mirrored(falling, falling_cell, f, nodes, count)
-        u = envelope(rising, rising_cell, r, falling, falling_cell, f, nodes, upper, upper_cell)
-        falling_jerk(
-            first, third, straight_a, straight_b, jerk, ease_j, upper, upper_cell, u, least
-        )
-        w = round_off(upper, upper_cell, u, least, law, law_cell)
+        mirrored(falling, falling_cell, f, own_size)
+        u = envelope(rising, rising_cell, r, falling, falling_cell, f, own_size, upper, upper_cell)
+        falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, upper, upper_cell, u, least)
+        w = round_off(upper, upper_cell, u, nodes, least, law, law_cell)
         m = cut(law, law_cell, w, nodes, pieces, cell)
         certificate(
-            pieces, cell, m, rows, begin, feed_rate, alone, velocity, acceleration, jerk, POINTS, worst
-        )
+            pieces, cell, m, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
+            1.0 + tolerances[2], worst,
+        )  # fmt: skip
         found = tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j)
     return pieces[:m], cell[:m], rounds, found
 

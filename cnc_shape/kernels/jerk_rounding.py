@@ -25,7 +25,7 @@ POP, TANGENT, END = 0, 1, 2  # what an arc does: passes below P, touches Q, meet
 
 
 @kernel
-def tangent(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
+def tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
     """Arc tangent to both phases by Newton's method from `t1`, `t2`; whether there is one, its ends, length."""
     for _ in range(NEWTON_STEPS):
         a1 = ap + bp * t1
@@ -35,7 +35,7 @@ def tangent(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
         t = (a1 - a2) / jerk
         end = v1 + t * (a1 - t * jerk / 2.0)
         speed_gap = end - v2
-        gap = (up - uq) + moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t) - moved(vq, aq, bq, t2)
+        gap = moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t) - uq - moved(vq, aq, bq, t2)
         m11 = a1 * (1.0 + bp / jerk)
         m12 = -a2 * (1.0 + bq / jerk)
         m21 = (1.0 + bp / jerk) * (v1 + a1 * t)
@@ -64,7 +64,7 @@ def tangent(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
     if t < 0.0 or v1 < 0.0 or v2 < 0.0:
         return False, t1, t2, t
     speed_gap = v1 + t * (a1 - t * jerk / 2.0) - v2
-    gap = (up - uq) + moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t) - moved(vq, aq, bq, t2)
+    gap = moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t) - uq - moved(vq, aq, bq, t2)
     good = abs(speed_gap) <= 10.0 * ROUNDING * max(v1, v2) and abs(gap) <= ROUNDING * (
         abs(uq) + 10.0 * max(v1, v2) * (t + t2)
     )
@@ -72,14 +72,14 @@ def tangent(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
 
 
 @kernel
-def through(up, vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
+def through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
     """Arc tangent to P that meets the end of Q, by Newton's method from `t1` and length `t`."""
     for _ in range(NEWTON_STEPS):
         a1 = ap + bp * t1
         v1 = vp + t1 * (ap + t1 * bp / 2.0)
         end = v1 + t * (a1 - t * jerk / 2.0)
         speed_gap = end - ve
-        gap = (up - ue) + moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t)
+        gap = moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t) - ue
         m11 = a1 + bp * t
         m12 = a1 - jerk * t
         m21 = v1 + t * (a1 + t * bp / 2.0)
@@ -104,7 +104,7 @@ def through(up, vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
     if a1 - jerk * t < ae or v1 < 0.0:
         return False, t1, t
     speed_gap = v1 + t * (a1 - t * jerk / 2.0) - ve
-    gap = (up - ue) + moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t)
+    gap = moved(vp, ap, bp, t1) + moved(v1, a1, -jerk, t) - ue
     good = abs(speed_gap) <= 10.0 * ROUNDING * max(v1, ve) and abs(gap) <= ROUNDING * (
         abs(ue) + 10.0 * max(v1, ve) * t
     )
@@ -112,7 +112,7 @@ def through(up, vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
 
 
 @kernel
-def highest(up, vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
+def highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
     """Largest excess of the arc that leaves P at `t1` over Q.
 
     Returns
@@ -124,7 +124,7 @@ def highest(up, vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
     at_end
         Whether that is the end of Q, and the arc is still getting nearer there.
     """
-    u1 = up + moved(vp, ap, bp, t1)
+    u1 = moved(vp, ap, bp, t1)
     v1 = vp + t1 * (ap + t1 * bp / 2.0)
     a1 = ap + bp * t1
     rest = (a1 + np.sqrt(a1 * a1 + 2.0 * jerk * v1)) / jerk
@@ -163,19 +163,19 @@ def highest(up, vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
 
 
 @kernel
-def arc(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
+def arc(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
     """Arc from P to Q: what it does, when it leaves P, how long it takes, when it touches Q."""
     ue = uq + moved(vq, aq, bq, tq)
     ve = vq + tq * (aq + tq * bq / 2.0)
     ae = aq + bq * tq
     kink = (ap + bp * tp - aq) / jerk
     good, t1, t2, t = tangent(
-        up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk,
+        vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk,
         max(0.0, tp - 0.5 * kink / (1.0 + bp / jerk)), min(tq, 0.5 * kink / (1.0 + bq / jerk)),
     )  # fmt: skip
     if good:
         return TANGENT, t1, t, t2
-    excess, t, t2, at_end = highest(up, vp, ap, bp, uq, vq, aq, bq, tq, jerk, 0.0)
+    excess, t, t2, at_end = highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, 0.0)
     if excess > 0.0:
         return POP, 0.0, 0.0, 0.0
     low = 0.0
@@ -184,7 +184,7 @@ def arc(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
         t1 = 0.5 * (low + high)
         if not low < t1 < high:
             break
-        more, s, s2, more_end = highest(up, vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1)
+        more, s, s2, more_end = highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1)
         if more > 0.0:
             high = t1
         else:
@@ -194,28 +194,30 @@ def arc(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
             at_end = more_end
         if step % 8 == 7:
             if more_end:
-                good, n1, n = through(up, vp, ap, bp, tp, ue, ve, ae, jerk, t1, s)
+                good, n1, n = through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, s)
                 if good:
                     return END, n1, n, tq
             else:
-                good, n1, n2, n = tangent(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, s2)
+                good, n1, n2, n = tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, s2)
                 if good:
                     return TANGENT, n1, n, n2
     return (END if at_end else TANGENT), low, t, t2
 
 
 @kernel
-def round_off(phases, cell, count, least_jerk, law, law_cell):
+def round_off(phases, cell, count, nodes, least_jerk, law, law_cell):
     """Round the steps of an envelope; returns how many phases the law has.
 
     Parameters
     ----------
     phases (m,5), cell (m,), count
         The envelope.
+    nodes (k+1,)
+        Places of the cells' ends.
     least_jerk (k,)
         Jerk by which the acceleration may fall in each cell; an arc keeps the least of all it may touch.
     law (2 m+2,5), law_cell
-        Output; the cell is that of a phase's start or, for an arc, that of the phase it leaves.
+        Output; places count from the start of the cell, which for an arc is that of the phase it leaves.
     """
     m = 0
     lowest = np.empty(least_jerk.size, np.int64)  # cells whose jerk is less than all that follow, so far
@@ -264,7 +266,8 @@ def round_off(phases, cell, count, least_jerk, law, law_cell):
             bp = law[p, 4]
             if joined and ap + bp * tp <= aq + NO_KINK * jerk:
                 break
-            what, t1, t, t2 = arc(up, vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk)
+            apart = (nodes[k] - nodes[first]) + (uq - up)
+            what, t1, t, t2 = arc(vp, ap, bp, tp, apart, vq, aq, bq, tq, jerk)
             if what == POP:
                 if m > 1:
                     m -= 1

@@ -142,12 +142,11 @@ def scan(
     ease_a, ease_j (k,)
         Shares of acceleration and jerk that may be used.
     phases (m,5), cell (m,)
-        Output: duration, place, speed, acceleration, jerk.
+        Output: duration, place in the cell, speed, acceleration, jerk.
     """
     m = 0
     v = 0.0
     a = 0.0
-    place = 0.0
     for k in range(length.size):
         h = length[k]
         straight = straight_a[k] > 0.0
@@ -172,7 +171,7 @@ def scan(
             to_exit = travel_time(v, a, steep, left)
             t = min(to_high, to_top, to_exit)
             phases[m, 0] = t
-            phases[m, 1] = place + (h - left)
+            phases[m, 1] = h - left
             phases[m, 2] = v
             phases[m, 3] = a
             phases[m, 4] = steep
@@ -195,7 +194,7 @@ def scan(
             to_exit = travel_time(v, a, 0.0, left)
             t = min(to_top, to_exit)
             phases[m, 0] = t
-            phases[m, 1] = place + (h - left)
+            phases[m, 1] = h - left
             phases[m, 2] = v
             phases[m, 3] = a
             phases[m, 4] = 0.0
@@ -210,7 +209,7 @@ def scan(
                 a = 0.0
         if left > 0.0:
             phases[m, 0] = left / v
-            phases[m, 1] = place + (h - left)
+            phases[m, 1] = h - left
             phases[m, 2] = v
             phases[m, 3] = 0.0
             phases[m, 4] = 0.0
@@ -225,7 +224,7 @@ def scan(
             elif limit <= entry_v:
                 m = before
                 phases[m, 0] = h / entry_v
-                phases[m, 1] = place
+                phases[m, 1] = 0.0
                 phases[m, 2] = entry_v
                 phases[m, 3] = 0.0
                 phases[m, 4] = 0.0
@@ -244,7 +243,7 @@ def scan(
                     a = (limit - entry_v) * (limit + entry_v) / (2.0 * h)
                     t = 2.0 * h / (limit + entry_v)
                 phases[m, 0] = t
-                phases[m, 1] = place
+                phases[m, 1] = 0.0
                 phases[m, 2] = entry_v
                 phases[m, 3] = a
                 phases[m, 4] = b
@@ -252,16 +251,13 @@ def scan(
                 m += 1
                 v = limit
                 a += b * t
-        place += h
     return m
 
 
 @kernel
-def mirrored(phases, cell, count, nodes, cells):
-    """Turn phases of the mirrored path into phases of the path itself, in place.
-
-    `nodes` (k+1,): places of the nodes.
-    """
+def mirrored(phases, cell, count, length):
+    """Turn phases of the mirrored path into phases of the path itself, in place."""
+    cells = length.size
     for n in range((count + 1) // 2):
         other = count - 1 - n
         for column in range(5):
@@ -271,22 +267,17 @@ def mirrored(phases, cell, count, nodes, cells):
         swap = cell[n]
         cell[n] = cell[other]
         cell[other] = swap
-    whole = nodes[cells]
     for n in range(count):
         t = phases[n, 0]
         v = phases[n, 2]
         a = phases[n, 3]
         b = phases[n, 4]
-        cell[n] = cells - 1 - cell[n]
-        phases[n, 1] = whole - (phases[n, 1] + moved(v, a, b, t))
+        k = cells - 1 - cell[n]
+        cell[n] = k
+        new = n == 0 or cell[n - 1] != k
+        phases[n, 1] = 0.0 if new else length[k] - (phases[n, 1] + moved(v, a, b, t))
         phases[n, 2] = v + t * (a + t * b / 2.0)
         phases[n, 3] = -(a + b * t)
-    for n in range(count):
-        k = cell[n]
-        if n == 0 or cell[n - 1] != k:
-            phases[n, 1] = nodes[k]
-        if n == count - 1:
-            phases[n, 2] = max(phases[n, 2], 0.0)
 
 
 @kernel
@@ -318,7 +309,7 @@ def put(phases, cell, m, t, place, v, a, b, k):
 
 
 @kernel
-def envelope(rising, rising_cell, rising_count, falling, falling_cell, falling_count, nodes, phases, cell):
+def envelope(rising, rising_cell, rising_count, falling, falling_cell, falling_count, length, phases, cell):
     """The lower of two laws, the one rising and the other falling in every cell; returns its phases' number.
 
     So they cross once in a cell at most, from the rising to the falling one.
@@ -345,8 +336,8 @@ def envelope(rising, rising_cell, rising_count, falling, falling_cell, falling_c
                 cell[m] = k
                 m += 1
         else:
-            low = nodes[k]
-            high = nodes[k + 1]
+            low = 0.0
+            high = length[k]
             for _ in range(MOST_STEPS):
                 place = 0.5 * (low + high)
                 if not low < place < high:
