@@ -8,22 +8,10 @@ none of its Bernstein coefficients exceeds the limit, it does not; halving the p
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_scan import moved
+from cnc_shape.kernels.jerk_phases import moved
 
+POINTS = 9  # of a piece at which velocity, acceleration and feed are looked at in planning
 SMALLEST_SHARE = 1.0 / 64.0  # -, of a piece that is halved
-
-
-@kernel
-def timed(pieces):
-    """Sum up the durations of pieces (m,6) to their times, with what rounding took away."""
-    time = 0.0
-    lost = 0.0
-    for m in range(pieces.shape[0]):
-        pieces[m, 0] = time
-        step = pieces[m, 1] - lost
-        following = time + step
-        lost = (following - time) - step
-        time = following
 
 
 @kernel
@@ -107,7 +95,7 @@ def jerk_bound(c, s, v, a, b, t, jerk, enough, powers, parts, waiting):
 
 @kernel
 def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, worst):
-    """Raise `worst` (4,) to the ratios of velocity, acceleration, jerk and feed to their limits at a point."""
+    """Raise `worst` (4,) to a point's ratios of velocity, acceleration, jerk and feed to their limits."""
     square = 0.0
     for i in range(velocity.size):
         third = 6.0 * c[3, i]
@@ -120,6 +108,38 @@ def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, w
         worst[1] = max(worst[1], abs(first * a + bend * v * v) / acceleration[i])
         worst[2] = max(worst[2], abs(first * b + v * (3.0 * bend * a + third * v * v)) / jerk[i])
     worst[3] = max(worst[3], np.sqrt(square) / feed_rate)
+
+
+@kernel
+def certificate(
+    pieces, cell, count, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, enough, worst
+):
+    """Largest ratios (k,4) of velocity, acceleration, jerk and feed to their limits in every cell.
+
+    Those of jerk are bounds, as near as it takes to tell them from `enough`; the others are looked for at
+    some points of every piece.
+    """
+    worst[:] = 0.0
+    powers = np.empty((5, 7))
+    parts = np.empty((5, 7))
+    waiting = np.empty((64, 2))
+    for m in range(count):
+        k = cell[m]
+        whole = first_cell + k
+        s = pieces[m, 2]
+        v = pieces[m, 3]
+        a = pieces[m, 4]
+        b = pieces[m, 5]
+        t = pieces[m, 1]
+        for n in range(POINTS):
+            e = t * n / (POINTS - 1)
+            piece_loads(
+                rows[whole], alone[whole], s + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, b,
+                velocity, acceleration, jerk, feed_rate[whole], worst[k],
+            )  # fmt: skip
+        worst[k, 2] = max(
+            worst[k, 2], jerk_bound(rows[whole], s, v, a, b, t, jerk, enough, powers, parts, waiting)
+        )
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""The time law of a section between two stops under a jerk limit: scans, rounding, certificate.
+"""The time law of a path under a jerk limit: scans, rounding and certificate of every section.
 
 The scans guess what the acceleration will be when they ask how much jerk the curvature takes, so the
 finished law is looked at: where it asks for more than the limit, the cell and its neighbours may use less in
@@ -9,97 +9,26 @@ the next round. Limits only fall, so this ends; straight cells never ask for too
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_certificate import jerk_bound, piece_loads
+from cnc_shape.kernels.jerk_caps import derivatives, falling_jerk, speed_caps, straight_jerk, tighten
+from cnc_shape.kernels.jerk_certificate import certificate
+from cnc_shape.kernels.jerk_phases import moved, time_to
 from cnc_shape.kernels.jerk_rounding import SHORTEST, round_off
-from cnc_shape.kernels.jerk_scan import (
-    LEAST_JERK_SHARE,
-    PHASES,
-    envelope,
-    last_speed,
-    mirrored,
-    moved,
-    scan,
-    time_to,
-)
-from cnc_shape.kernels.speed_limits import ends
+from cnc_shape.kernels.jerk_scan import PHASES, envelope, mirrored, scan
 
-POINTS = 9  # of a piece at which the certificate looks
 NEAR = 1e-10  # mm or rad, of a node: as good as there
-STRAIGHT_JERK_SHARE = 1e-5  # -, of the jerk limit that the curvature of a straight cell may use
-EASE_ACCELERATION = 0.999  # -, over the excess
-EASE_JERK = 0.99
 
 
 @kernel
-def derivatives(rows, length, first, bend, third):
-    """q' and q'' at both ends (k,2,d), q''' (k,d)."""
-    d = rows.shape[2]
-    for k in range(length.size):
-        ends(rows[k], length[k], first[k, 0], bend[k, 0], first[k, 1], bend[k, 1])
-        for i in range(d):
-            third[k, i] = 6.0 * rows[k, 3, i]
-
-
-@kernel
-def straight_jerk(limit_v2, straight, first, bend, third, jerk, straight_a, straight_b):
-    """Path acceleration and jerk of straight cells; both 0 for those that the jerk limit sees as curved."""
-    for k in range(straight.size):
-        straight_a[k] = straight[k]
-        straight_b[k] = np.inf
-        v = np.sqrt(limit_v2[k, 0])
-        for i in range(jerk.size):
-            if abs(first[k, 0, i]) > 0.0:
-                straight_b[k] = min(straight_b[k], jerk[i] / abs(first[k, 0, i]))
-            curved = abs(third[k, i]) * v**3
-            curved += 3.0 * max(abs(bend[k, 0, i]), abs(bend[k, 1, i])) * v * straight[k]
-            if curved > STRAIGHT_JERK_SHARE * jerk[i]:
-                straight_a[k] = 0.0
-        if straight_a[k] == 0.0:
-            straight_b[k] = 0.0
-
-
-@kernel
-def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease_v, ease_a, ease_j, top, cap):
-    """Highest speeds in the cells and at the nodes, from velocity, feed, curvature and its change."""
-    count = limit_v2.shape[0]
-    cap[0] = 0.0
-    cap[count] = 0.0
-    for k in range(count):
-        top[k] = ease_v[k] * np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1]))
-        if straight_a[k] == 0.0:
-            for i in range(jerk.size):
-                if third[k, i] != 0.0:
-                    top[k] = min(top[k], np.cbrt(ease_j[k] * jerk[i] / abs(third[k, i])))
-    for k in range(1, count):
-        cap[k] = min(top[k - 1], top[k])
-        for side in range(2):
-            c = k - 1 + side
-            if straight_a[c] == 0.0:
-                for i in range(jerk.size):
-                    curvature = abs(bend[c, 1 - side, i])
-                    if curvature != 0.0:
-                        cap[k] = min(cap[k], np.sqrt(ease_a[c] * acceleration[i] / curvature))
-
-
-@kernel
-def falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, phases, cell, count, least):
-    """Jerk (k,) by which the path acceleration may fall in each cell, at the envelope's speed."""
-    speed = np.zeros(least.size)
-    for n in range(count):
-        k = cell[n]
-        speed[k] = max(speed[k], max(phases[n, 2], last_speed(phases, n)))
-    for k in range(least.size):
-        if straight_a[k] > 0.0:
-            least[k] = ease_j[k] * straight_b[k]
-            continue
-        least[k] = np.inf
-        for i in range(jerk.size):
-            for end in range(2):
-                q = first[k, end, i]
-                if q != 0.0:
-                    own = third[k, i] * speed[k] ** 3 * (1.0 if q > 0.0 else -1.0)
-                    room = max(ease_j[k] * jerk[i] + own, LEAST_JERK_SHARE * ease_j[k] * jerk[i])
-                    least[k] = min(least[k], room / abs(q))
+def timed(pieces):
+    """Sum up the durations of pieces (m,6) to their times, with what rounding took away."""
+    time = 0.0
+    lost = 0.0
+    for m in range(pieces.shape[0]):
+        pieces[m, 0] = time
+        step = pieces[m, 1] - lost
+        following = time + step
+        lost = (following - time) - step
+        time = following
 
 
 @kernel
@@ -143,66 +72,6 @@ def cut(law, law_cell, count, nodes, pieces, cell):
             k += 1
             begin = until
     return m
-
-
-@kernel
-def certificate(
-    pieces, cell, count, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, enough, worst
-):
-    """Largest ratios (k,4) of velocity, acceleration, jerk and feed to their limits in every cell.
-
-    Those of jerk are bounds, as near as it takes to tell them from `enough`; the others are looked for at
-    some points of every piece.
-    """
-    worst[:] = 0.0
-    powers = np.empty((5, 7))
-    parts = np.empty((5, 7))
-    waiting = np.empty((64, 2))
-    for m in range(count):
-        k = cell[m]
-        whole = first_cell + k
-        s = pieces[m, 2]
-        v = pieces[m, 3]
-        a = pieces[m, 4]
-        b = pieces[m, 5]
-        t = pieces[m, 1]
-        for n in range(POINTS):
-            e = t * n / (POINTS - 1)
-            piece_loads(
-                rows[whole], alone[whole], s + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, b,
-                velocity, acceleration, jerk, feed_rate[whole], worst[k],
-            )  # fmt: skip
-        worst[k, 2] = max(
-            worst[k, 2], jerk_bound(rows[whole], s, v, a, b, t, jerk, enough, powers, parts, waiting)
-        )
-
-
-@kernel
-def tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j):
-    """Lower what cells and their neighbours may use, where the law asked for too much; whether it did."""
-    count = ease_v.size
-    found = 0
-    lower = np.ones((count, 3))
-    for k in range(count):
-        factor = 1.0
-        fast = max(worst[k, 0], worst[k, 3])
-        if fast > 1.0 + tolerances[0]:
-            lower[k, 0] = EASE_ACCELERATION / fast
-        if worst[k, 1] > 1.0 + tolerances[1]:
-            factor = EASE_ACCELERATION / worst[k, 1]
-            lower[k, 1] = factor
-        if worst[k, 2] > 1.0 + tolerances[2]:
-            lower[k, 2] = EASE_JERK / worst[k, 2]
-        if lower[k, 0] < 1.0 or lower[k, 1] < 1.0 or lower[k, 2] < 1.0:
-            found += 1
-    if found > 0:
-        for k in range(count):
-            for near in range(max(k - 1, 0), min(k + 2, count)):
-                ease_v[k] *= lower[near, 0] if near == k else 1.0
-                if straight_a[k] == 0.0 or near == k:
-                    ease_a[k] *= lower[near, 1]
-                    ease_j[k] *= lower[near, 2]
-    return found
 
 
 @kernel

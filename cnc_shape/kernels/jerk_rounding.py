@@ -15,7 +15,7 @@ therefore the one; where it finds none, the gap decides by bisection.
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_scan import MOST_STEPS, moved, put, time_to
+from cnc_shape.kernels.jerk_phases import MOST_STEPS, moved, put, time_to
 
 SHORTEST = 1e-12  # s, a shorter phase is rounding
 NO_KINK = 1e-9  # s, times the jerk: a smaller step of acceleration is rounding
@@ -26,7 +26,7 @@ POP, TANGENT, END = 0, 1, 2  # what an arc does: passes below P, touches Q, meet
 
 @kernel
 def tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
-    """Arc tangent to both phases by Newton's method from `t1`, `t2`; whether there is one, its ends, length."""
+    """Arc tangent to both phases, by Newton's method: whether there is one, its two ends, its length."""
     for _ in range(NEWTON_STEPS):
         a1 = ap + bp * t1
         v1 = vp + t1 * (ap + t1 * bp / 2.0)
@@ -73,7 +73,7 @@ def tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
 
 @kernel
 def through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
-    """Arc tangent to P that meets the end of Q, by Newton's method from `t1` and length `t`."""
+    """Arc tangent to P that meets the end of Q, by Newton's method: whether there is one, start, length."""
     for _ in range(NEWTON_STEPS):
         a1 = ap + bp * t1
         v1 = vp + t1 * (ap + t1 * bp / 2.0)

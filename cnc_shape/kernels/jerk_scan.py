@@ -12,113 +12,10 @@ follows can be braked for. The lower of both, the envelope, only ever has *falli
 import numpy as np
 
 from cnc_shape.kernels import kernel
+from cnc_shape.kernels.jerk_caps import curved_caps
+from cnc_shape.kernels.jerk_phases import MOST_STEPS, last_speed, moved, put, speed_at, travel_time
 
-MOST_STEPS = 60  # of a Newton iteration or a bisection
 PHASES = 4  # of a scan in one cell, at most
-LEAST_JERK_SHARE = 0.3  # -, of the jerk limit, left for the path jerk however much the curvature takes
-
-
-@kernel
-def travel_time(v, a, b, h):
-    """Smallest t with ``v t + a t^2/2 + b t^3/6 = h`` where no coefficient is negative.
-
-    Each term alone bounds t from above, and the sum is convex: Newton descends to the root.
-    """
-    t = np.inf
-    if v > 0.0:
-        t = min(t, h / v)
-    if a > 0.0:
-        t = min(t, np.sqrt(2.0 * h / a))
-    if b > 0.0:
-        t = min(t, np.cbrt(6.0 * h / b))
-    for _ in range(MOST_STEPS):
-        step = (t * (v + t * (a / 2.0 + t * b / 6.0)) - h) / (v + t * (a + t * b / 2.0))
-        if not step > 0.0:
-            break
-        lower = t - step
-        if lower >= t:
-            break
-        t = lower
-    return t
-
-
-@kernel
-def moved(v, a, b, t):
-    """Distance after `t`."""
-    return t * (v + t * (a / 2.0 + t * b / 6.0))
-
-
-@kernel
-def time_to(v, a, b, most, h):
-    """Time in [0, `most`] at which a phase that never turns back has moved by `h`."""
-    low = 0.0
-    high = most
-    t = min(most, h / v) if v > 0.0 else 0.5 * most
-    for _ in range(2 * MOST_STEPS):
-        gap = moved(v, a, b, t) - h
-        if gap > 0.0:
-            high = t
-        else:
-            low = t
-        speed = v + t * (a + t * b / 2.0)
-        following = t - gap / speed if speed > 0.0 else 0.5 * (low + high)
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        if abs(following - t) <= 1e-16 * most or following == t:
-            return following
-        t = following
-    return t
-
-
-@kernel
-def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease_a, ease_j):
-    """Highest path acceleration and path jerk for a cell that is entered with `v` and `a`.
-
-    `first`, `bend` (2,d): q' and q'' at both ends; `third` (d,): q'''. The rows are
-
-        |q' a + q'' v^2| <= A,     |q' b + 3 q'' v a + q''' v^3| <= J
-
-    at both ends, with the speed and acceleration that the cell will be left with as far as they can be told:
-    the certificate of the finished law sees what was wrong.
-    """
-    high = np.inf
-    for i in range(third.size):
-        if first[0, i] != 0.0:
-            sign = 1.0 if first[0, i] > 0.0 else -1.0
-            high = min(high, (ease_a * acceleration[i] - sign * bend[0, i] * v * v) / abs(first[0, i]))
-        bent = 3.0 * abs(bend[0, i]) * v
-        if bent > 0.0:
-            high = min(high, ease_j * jerk[i] / bent)
-    high = max(high, 0.0)
-    x = min(v * v + 2.0 * high * h, next_cap * next_cap)
-    x = max(x, min(v, next_cap) ** 2)
-    exit_v = np.sqrt(x)
-    for i in range(third.size):
-        if first[1, i] != 0.0:
-            sign = 1.0 if first[1, i] > 0.0 else -1.0
-            high = min(high, (ease_a * acceleration[i] - sign * bend[1, i] * x) / abs(first[1, i]))
-        bent = 3.0 * abs(bend[1, i]) * exit_v
-        if bent > 0.0:
-            high = min(high, ease_j * jerk[i] / bent)
-    high = max(high, 0.0)
-    a = min(a, high)
-    steep = np.inf
-    for i in range(third.size):
-        if first[0, i] != 0.0:
-            sign = 1.0 if first[0, i] > 0.0 else -1.0
-            own = sign * (3.0 * bend[0, i] * v * a + third[i] * v**3)
-            room = max(ease_j * jerk[i] - own, LEAST_JERK_SHARE * ease_j * jerk[i])
-            steep = min(steep, room / abs(first[0, i]))
-    left_a = high
-    if v > 0.0 and steep < np.inf:
-        left_a = min(high, a + steep * h / v)
-    for i in range(third.size):
-        if first[1, i] != 0.0:
-            sign = 1.0 if first[1, i] > 0.0 else -1.0
-            own = sign * (3.0 * bend[1, i] * exit_v * left_a + third[i] * exit_v**3)
-            room = max(ease_j * jerk[i] - own, LEAST_JERK_SHARE * ease_j * jerk[i])
-            steep = min(steep, room / abs(first[1, i]))
-    return high, steep
 
 
 @kernel
@@ -278,34 +175,6 @@ def mirrored(phases, cell, count, length):
         phases[n, 1] = 0.0 if new else length[k] - (phases[n, 1] + moved(v, a, b, t))
         phases[n, 2] = v + t * (a + t * b / 2.0)
         phases[n, 3] = -(a + b * t)
-
-
-@kernel
-def speed_at(phases, low, high, place):
-    """Phase among `low` to `high` in which `place` lies, the time in it, and the speed."""
-    n = low
-    while n + 1 < high and phases[n + 1, 1] <= place:
-        n += 1
-    t = time_to(phases[n, 2], phases[n, 3], phases[n, 4], phases[n, 0], place - phases[n, 1])
-    return n, t, phases[n, 2] + t * (phases[n, 3] + t * phases[n, 4] / 2.0)
-
-
-@kernel
-def last_speed(phases, n):
-    """Speed at the end of a phase."""
-    t = phases[n, 0]
-    return phases[n, 2] + t * (phases[n, 3] + t * phases[n, 4] / 2.0)
-
-
-@kernel
-def put(phases, cell, m, t, place, v, a, b, k):
-    """Write a phase."""
-    phases[m, 0] = t
-    phases[m, 1] = place
-    phases[m, 2] = v
-    phases[m, 3] = a
-    phases[m, 4] = b
-    cell[m] = k
 
 
 @kernel
