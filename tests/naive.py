@@ -1093,8 +1093,8 @@ def highest_below(place, speed, jerk, at):
         return np.maximum(v + a * t - jerk * t * t / 2, 0.0)
 
     def below(v, a):
-        fits = (speed_after(v, a, place[ahead] - at) <= speed[ahead] + 1e-12).all()
-        return fits, (speed_after(v, -a, (at - place[behind])[::-1]) <= speed[behind][::-1] + 1e-12).all()
+        fits = (speed_after(v, a, place[ahead] - at) <= speed[ahead] + 1e-6).all()
+        return fits, (speed_after(v, -a, (at - place[behind])[::-1]) <= speed[behind][::-1] + 1e-6).all()
 
     low, high = 0.0, np.interp(at, place, speed)
     for _ in range(25):
