@@ -163,9 +163,13 @@ def tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j):
             found += 1
     if found > 0:
         for k in range(count):
-            for near in range(max(k - 1, 0), min(k + 2, count)):
-                ease_v[k] *= lower[near, 0] if near == k else 1.0
-                if straight_a[k] == 0.0 or near == k:
-                    ease_a[k] *= lower[near, 1]
-                    ease_j[k] *= lower[near, 2]
+            least_a = lower[k, 1]
+            least_j = lower[k, 2]
+            if straight_a[k] == 0.0:
+                for near in range(max(k - 1, 0), min(k + 2, count)):
+                    least_a = min(least_a, lower[near, 1])
+                    least_j = min(least_j, lower[near, 2])
+            ease_v[k] *= lower[k, 0]
+            ease_a[k] *= least_a
+            ease_j[k] *= least_j
     return found
