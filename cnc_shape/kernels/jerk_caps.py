@@ -18,6 +18,9 @@ LEAST_JERK_SHARE = 0.3  # -, of the jerk limit, left for the path jerk however m
 STRAIGHT_JERK_SHARE = 1e-5  # -, of the jerk limit that the curvature of a straight cell may use
 EASE_ACCELERATION = 0.999  # -, over the excess
 EASE_JERK = 0.99
+LEAST_ROOM = 0.5
+MOST_BASE = 0.7
+BASE_POWER = 0.5
 
 
 @kernel
@@ -49,17 +52,17 @@ def straight_jerk(limit_v2, straight, first, bend, third, jerk, straight_a, stra
 
 
 @kernel
-def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease_v, ease_a, ease_j, top, cap):
+def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease, top, cap):
     """Highest speeds in the cells and at the nodes, from velocity, feed, curvature and its change."""
     count = limit_v2.shape[0]
     cap[0] = 0.0
     cap[count] = 0.0
     for k in range(count):
-        top[k] = ease_v[k] * np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1]))
+        top[k] = ease[0, k] * np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1]))
         if straight_a[k] == 0.0:
             for i in range(jerk.size):
                 if third[k, i] != 0.0:
-                    top[k] = min(top[k], np.cbrt(ease_j[k] * jerk[i] / abs(third[k, i])))
+                    top[k] = min(top[k], np.cbrt(ease[2, k] * jerk[i] / abs(third[k, i])))
     for k in range(1, count):
         cap[k] = min(top[k - 1], top[k])
         for side in range(2):
@@ -68,11 +71,11 @@ def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease_v, ea
                 for i in range(jerk.size):
                     curvature = abs(bend[c, 1 - side, i])
                     if curvature != 0.0:
-                        cap[k] = min(cap[k], np.sqrt(ease_a[c] * acceleration[i] / curvature))
+                        cap[k] = min(cap[k], np.sqrt(ease[1, c] * acceleration[i] / curvature))
 
 
 @kernel
-def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease_a, ease_j):
+def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease):
     """Highest path acceleration and path jerk for a cell that is entered with `v` and `a`.
 
     `first`, `bend` (2,d): q' and q'' at both ends; `third` (d,): q'''. The rows are
@@ -86,10 +89,10 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease_
     for i in range(third.size):
         if first[0, i] != 0.0:
             sign = 1.0 if first[0, i] > 0.0 else -1.0
-            high = min(high, (ease_a * acceleration[i] - sign * bend[0, i] * v * v) / abs(first[0, i]))
+            high = min(high, (ease[1] * acceleration[i] - sign * bend[0, i] * v * v) / abs(first[0, i]))
         bent = 3.0 * abs(bend[0, i]) * v
         if bent > 0.0:
-            high = min(high, ease_j * jerk[i] / bent)
+            high = min(high, ease[2] * jerk[i] / bent)
     high = max(high, 0.0)
     x = min(v * v + 2.0 * high * h, next_cap * next_cap)
     x = max(x, min(v, next_cap) ** 2)
@@ -97,10 +100,10 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease_
     for i in range(third.size):
         if first[1, i] != 0.0:
             sign = 1.0 if first[1, i] > 0.0 else -1.0
-            high = min(high, (ease_a * acceleration[i] - sign * bend[1, i] * x) / abs(first[1, i]))
+            high = min(high, (ease[1] * acceleration[i] - sign * bend[1, i] * x) / abs(first[1, i]))
         bent = 3.0 * abs(bend[1, i]) * exit_v
         if bent > 0.0:
-            high = min(high, ease_j * jerk[i] / bent)
+            high = min(high, ease[2] * jerk[i] / bent)
     high = max(high, 0.0)
     a = min(a, high)
     steep = np.inf
@@ -108,7 +111,7 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease_
         if first[0, i] != 0.0:
             sign = 1.0 if first[0, i] > 0.0 else -1.0
             own = sign * (3.0 * bend[0, i] * v * a + third[i] * v**3)
-            room = max(ease_j * jerk[i] - own, LEAST_JERK_SHARE * ease_j * jerk[i])
+            room = ease[3] * max(jerk[i] - own, LEAST_JERK_SHARE * jerk[i])
             steep = min(steep, room / abs(first[0, i]))
     left_a = high
     if v > 0.0 and steep < np.inf:
@@ -117,13 +120,13 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease_
         if first[1, i] != 0.0:
             sign = 1.0 if first[1, i] > 0.0 else -1.0
             own = sign * (3.0 * bend[1, i] * exit_v * left_a + third[i] * exit_v**3)
-            room = max(ease_j * jerk[i] - own, LEAST_JERK_SHARE * ease_j * jerk[i])
+            room = ease[3] * max(jerk[i] - own, LEAST_JERK_SHARE * jerk[i])
             steep = min(steep, room / abs(first[1, i]))
     return high, steep
 
 
 @kernel
-def falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, phases, cell, count, least):
+def falling_jerk(first, third, straight_a, straight_b, jerk, ease, phases, cell, count, least):
     """Jerk (k,) by which the path acceleration may fall in each cell, at the envelope's speed."""
     speed = np.zeros(least.size)
     for n in range(count):
@@ -131,7 +134,7 @@ def falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, phases, cel
         speed[k] = max(speed[k], max(phases[n, 2], last_speed(phases, n)))
     for k in range(least.size):
         if straight_a[k] > 0.0:
-            least[k] = ease_j[k] * straight_b[k]
+            least[k] = straight_b[k]
             continue
         least[k] = np.inf
         for i in range(jerk.size):
@@ -139,37 +142,51 @@ def falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, phases, cel
                 q = first[k, end, i]
                 if q != 0.0:
                     own = third[k, i] * speed[k] ** 3 * (1.0 if q > 0.0 else -1.0)
-                    room = max(ease_j[k] * jerk[i] + own, LEAST_JERK_SHARE * ease_j[k] * jerk[i])
+                    room = ease[4, k] * max(jerk[i] + own, LEAST_JERK_SHARE * jerk[i])
                     least[k] = min(least[k], room / abs(q))
 
 
 @kernel
-def tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j):
-    """Lower what cells and their neighbours may use, where the law asked for too much; whether it did."""
-    count = ease_v.size
+def tighten(worst, straight_a, tolerances, ease):
+    """Lower what cells and their neighbours may use, where the law asked for too much; returns how many.
+
+    Parameters
+    ----------
+    worst (k,7)
+        Ratios of velocity, acceleration, feed; of jerk where b is 0, rises, falls; and of jerk but for b.
+    ease (5,k)
+        Shares of speed, acceleration, jerk by curvature, rising and falling b that may be used.
+
+    Too much jerk where b is not 0 is first of all b's affair: to lower the speed costs more.
+    """
+    count = straight_a.size
     found = 0
-    lower = np.ones((count, 3))
+    lower = np.ones((5, count))
     for k in range(count):
-        factor = 1.0
-        fast = max(worst[k, 0], worst[k, 3])
+        fast = max(worst[k, 0], worst[k, 2])
         if fast > 1.0 + tolerances[0]:
-            lower[k, 0] = EASE_ACCELERATION / fast
+            lower[0, k] = EASE_ACCELERATION / fast
         if worst[k, 1] > 1.0 + tolerances[1]:
-            factor = EASE_ACCELERATION / worst[k, 1]
-            lower[k, 1] = factor
-        if worst[k, 2] > 1.0 + tolerances[2]:
-            lower[k, 2] = EASE_JERK / worst[k, 2]
-        if lower[k, 0] < 1.0 or lower[k, 1] < 1.0 or lower[k, 2] < 1.0:
-            found += 1
+            lower[1, k] = EASE_ACCELERATION / worst[k, 1]
+        base = worst[k, 6]
+        if max(base, worst[k, 3]) > 1.0 + tolerances[2]:
+            lower[2, k] = EASE_JERK / max(base, worst[k, 3])
+        for n in range(2):
+            ratio = worst[k, 4 + n]
+            if ratio > 1.0 + tolerances[2]:
+                room = (1.0 - base) / (ratio - base) if ratio > base else 1.0
+                lower[3 + n, k] = EASE_JERK * min(1.0 / ratio, max(room, LEAST_ROOM))
+                if base > MOST_BASE:
+                    lower[2, k] = min(lower[2, k], EASE_JERK / ratio**BASE_POWER)
+        for n in range(5):
+            if lower[n, k] < 1.0:
+                found += 1
+                break
     if found > 0:
         for k in range(count):
-            least_a = lower[k, 1]
-            least_j = lower[k, 2]
-            if straight_a[k] == 0.0:
-                for near in range(max(k - 1, 0), min(k + 2, count)):
-                    least_a = min(least_a, lower[near, 1])
-                    least_j = min(least_j, lower[near, 2])
-            ease_v[k] *= lower[k, 0]
-            ease_a[k] *= least_a
-            ease_j[k] *= least_j
+            for n in range(5):
+                least = lower[n, k]
+                if n > 0 and straight_a[k] == 0.0:
+                    least = min(least, min(lower[n, max(k - 1, 0)], lower[n, min(k + 1, count - 1)]))
+                ease[n, k] *= least
     return found

@@ -114,15 +114,17 @@ def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, w
 def certificate(
     pieces, cell, count, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, enough, worst
 ):
-    """Largest ratios (k,4) of velocity, acceleration, jerk and feed to their limits in every cell.
+    """Largest ratios (k,7) of what the law asks for to the limits, in every cell.
 
-    Those of jerk are bounds, as near as it takes to tell them from `enough`; the others are looked for at
-    some points of every piece.
+    Velocity, acceleration, feed; jerk where the path jerk b is 0, where it is positive, where it is
+    negative; jerk but for that by b. The jerks are bounds, as near as it takes to tell them from `enough`;
+    the others are looked for at some points of every piece.
     """
     worst[:] = 0.0
     powers = np.empty((5, 7))
     parts = np.empty((5, 7))
     waiting = np.empty((64, 2))
+    loads = np.empty(4)
     for m in range(count):
         k = cell[m]
         whole = first_cell + k
@@ -131,15 +133,20 @@ def certificate(
         a = pieces[m, 4]
         b = pieces[m, 5]
         t = pieces[m, 1]
+        loads[:] = 0.0
         for n in range(POINTS):
             e = t * n / (POINTS - 1)
             piece_loads(
-                rows[whole], alone[whole], s + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, b,
-                velocity, acceleration, jerk, feed_rate[whole], worst[k],
+                rows[whole], alone[whole], s + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, 0.0,
+                velocity, acceleration, jerk, feed_rate[whole], loads,
             )  # fmt: skip
-        worst[k, 2] = max(
-            worst[k, 2], jerk_bound(rows[whole], s, v, a, b, t, jerk, enough, powers, parts, waiting)
-        )
+        worst[k, 0] = max(worst[k, 0], loads[0])
+        worst[k, 1] = max(worst[k, 1], loads[1])
+        worst[k, 2] = max(worst[k, 2], loads[3])
+        worst[k, 6] = max(worst[k, 6], loads[2])
+        bound = jerk_bound(rows[whole], s, v, a, b, t, jerk, enough, powers, parts, waiting)
+        n = 3 if b == 0.0 else (4 if b > 0.0 else 5)
+        worst[k, n] = max(worst[k, n], bound)
 
 
 @kernel

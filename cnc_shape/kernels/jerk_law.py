@@ -117,9 +117,7 @@ def section_law(
     own_size = size.copy()
     back_straight_a = straight_a[::-1].copy()
     back_straight_b = straight_b[::-1].copy()
-    ease_v = np.ones(count)
-    ease_a = np.ones(count)
-    ease_j = np.ones(count)
+    ease = np.ones((5, count))
     top = np.empty(count)
     cap = np.empty(count + 1)
     least = np.empty(count)
@@ -133,32 +131,32 @@ def section_law(
     law_cell = np.empty(4 * PHASES * count + 4, np.int64)
     pieces = np.empty((4 * PHASES * count + 4 + count, 6))
     cell = np.empty(4 * PHASES * count + 4 + count, np.int64)
-    worst = np.empty((count, 4))
+    worst = np.empty((count, 7))
     rounds = 0
     found = 1
     m = 0
     while found > 0 and rounds < most_rounds:
         rounds += 1
-        speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease_v, ease_a, ease_j, top, cap)
+        speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, top, cap)
         r = scan(
-            own_size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease_a,
-            ease_j, rising, rising_cell,
+            own_size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease,
+            rising, rising_cell,
         )  # fmt: skip
         f = scan(
             back_size, top[::-1].copy(), cap[::-1].copy(), back_straight_a, back_straight_b, back_first,
-            back_bend, back_third, acceleration, jerk, ease_a[::-1].copy(), ease_j[::-1].copy(), falling,
+            back_bend, back_third, acceleration, jerk, ease[:, ::-1].copy(), falling,
             falling_cell,
         )  # fmt: skip
         mirrored(falling, falling_cell, f, own_size)
         u = envelope(rising, rising_cell, r, falling, falling_cell, f, own_size, upper, upper_cell)
-        falling_jerk(first, third, straight_a, straight_b, jerk, ease_j, upper, upper_cell, u, least)
+        falling_jerk(first, third, straight_a, straight_b, jerk, ease, upper, upper_cell, u, least)
         w = round_off(upper, upper_cell, u, nodes, least, law, law_cell)
         m = cut(law, law_cell, w, nodes, pieces, cell)
         certificate(
             pieces, cell, m, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
             1.0 + tolerances[2], worst,
         )  # fmt: skip
-        found = tighten(worst, straight_a, tolerances, ease_v, ease_a, ease_j)
+        found = tighten(worst, straight_a, tolerances, ease)
     return pieces[:m], cell[:m], rounds, found
 
 

@@ -20,7 +20,7 @@ PHASES = 4  # of a scan in one cell, at most
 
 @kernel
 def scan(
-    length, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease_a, ease_j,
+    length, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease,
     phases, cell,
 ):  # fmt: skip
     """Run up a path from rest; returns how many phases were written.
@@ -36,8 +36,8 @@ def scan(
         speed.
     first, bend (k,2,d), third (k,d)
         q' and q'' at both ends of the cells, q'''.
-    ease_a, ease_j (k,)
-        Shares of acceleration and jerk that may be used.
+    ease (5,k)
+        Shares of the limits that may be used on curved cells (`jerk_caps.tighten`).
     phases (m,5), cell (m,)
         Output: duration, place in the cell, speed, acceleration, jerk.
     """
@@ -48,11 +48,11 @@ def scan(
         h = length[k]
         straight = straight_a[k] > 0.0
         if straight:
-            high = ease_a[k] * straight_a[k]
-            steep = ease_j[k] * straight_b[k]
+            high = straight_a[k]
+            steep = straight_b[k]
         else:
             high, steep = curved_caps(
-                first[k], bend[k], third[k], h, v, a, cap[k + 1], acceleration, jerk, ease_a[k], ease_j[k]
+                first[k], bend[k], third[k], h, v, a, cap[k + 1], acceleration, jerk, ease[:, k]
             )
         a = min(a, high)
         before = m
