@@ -17,10 +17,10 @@ from cnc_shape.kernels.speed_limits import ends
 LEAST_JERK_SHARE = 0.3  # -, of the jerk limit, left for the path jerk however much the curvature takes
 STRAIGHT_JERK_SHARE = 1e-5  # -, of the jerk limit that the curvature of a straight cell may use
 EASE_ACCELERATION = 0.999  # -, over the excess
-EASE_JERK = 0.99
+EASE_JERK = 0.995
 LEAST_ROOM = 0.5
-MOST_BASE = 0.7
-BASE_POWER = 0.5
+MOST_BASE = 0.8
+BASE_POWER = 0.25
 
 
 @kernel
