@@ -67,7 +67,7 @@ def square(tolerance, jerk, mode=PathMode.BLEND):
 def test_square_numbers():
     """20 mm, F 50 mm/s, 500 mm/s^2, j = 50 a. At rest in the corners the closed form: 4 (20/50 + 50/500 + 500/25000)."""
     assert_allclose(square(0.01, 25_000.0, PathMode.EXACT_STOP), 2.08, rtol=1e-12)
-    assert square(0.035, 25_000.0) <= 2.09
+    assert square(0.035, 25_000.0) <= 2.08
     assert square(0.35, 25_000.0) <= 1.825  # linear programs: 1.822
 
 
@@ -206,7 +206,7 @@ def test_an_axis_without_a_jerk_limit_beside_one_with():
     assert times[0] < profile.end_time < times[1]
 
 
-@pytest.mark.parametrize(("j", "excess"), [(50.0, 0.035), (25.0, 0.19)])
+@pytest.mark.parametrize(("j", "excess"), [(50.0, 0.03), (25.0, 0.06)])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_splines_take_some_percent_longer_than_linear_programs_find(seed, j, excess):
     path, _ = spline_path(np.random.default_rng(seed).uniform(-30, 30, size=(6, 3)))
