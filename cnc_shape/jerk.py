@@ -16,7 +16,8 @@ from cnc_shape.arrays import FloatArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import Profile, check_executable, plan, rotary_only
 from cnc_shape.kernels.jerk_certificate import law_excesses
-from cnc_shape.kernels.jerk_law import path_law, timed
+from cnc_shape.kernels.jerk_law import path_law
+from cnc_shape.kernels.jerk_pieces import timed
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.limits import Limits
 from cnc_shape.smoothing import Path

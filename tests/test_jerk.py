@@ -285,7 +285,9 @@ def test_rounding_finds_the_highest_law_below_an_envelope(seed):
     own_points, own_speeds = (np.concatenate(column) for column in zip(*ours, strict=True))
     for at in np.linspace(0.1, 0.97, 6) * place:
         expected = naive.highest_below(points, speeds, jerk, at)
-        assert_allclose(np.interp(at, own_points, own_speeds), expected, rtol=2e-3)  # the twin's points are as near
+        assert_allclose(
+            np.interp(at, own_points, own_speeds), expected, rtol=2e-3
+        )  # the twin's points are as near
 
 
 def piece_points(phase, count):

@@ -35,6 +35,7 @@ TWINS = {
     "kernels/jerk_certificate.py": ("naive.law_loads", "test_jerk.py"),
     "kernels/jerk_law.py": ("naive.fastest_with_jerk", "test_jerk.py"),
     "kernels/jerk_phases.py": ("naive.rest_to_rest", "test_jerk.py"),
+    "kernels/jerk_pieces.py": ("naive.law_loads", "test_jerk.py"),
     "kernels/jerk_rounding.py": ("naive.highest_below", "test_jerk.py"),
     "kernels/jerk_scan.py": ("naive.rest_to_rest", "test_jerk.py"),
     "kernels/kinematics_delta.py": ("naive.trilateration", "test_kinematics.py"),

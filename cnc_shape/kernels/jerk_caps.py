@@ -52,18 +52,19 @@ def straight_jerk(limit_v2, straight, first, bend, third, jerk, straight_a, stra
 
 
 @kernel
-def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease, top, cap):
-    """Highest speeds in the cells and at the nodes, from velocity, feed, curvature and its change."""
+def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease, begin, end, top, cap):
+    """Highest speeds in the cells `begin` to `end` and at their nodes, from all that is known before."""
     count = limit_v2.shape[0]
-    cap[0] = 0.0
-    cap[count] = 0.0
-    for k in range(count):
-        top[k] = ease[0, k] * np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1]))
+    for k in range(begin, end):
+        top[k] = ease[k, 0] * np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1]))
         if straight_a[k] == 0.0:
             for i in range(jerk.size):
                 if third[k, i] != 0.0:
-                    top[k] = min(top[k], np.cbrt(ease[2, k] * jerk[i] / abs(third[k, i])))
-    for k in range(1, count):
+                    top[k] = min(top[k], np.cbrt(ease[k, 2] * jerk[i] / abs(third[k, i])))
+    for k in range(begin, end + 1):
+        if k == 0 or k == count:
+            cap[k] = 0.0
+            continue
         cap[k] = min(top[k - 1], top[k])
         for side in range(2):
             c = k - 1 + side
@@ -71,7 +72,7 @@ def speed_caps(limit_v2, straight_a, bend, third, acceleration, jerk, ease, top,
                 for i in range(jerk.size):
                     curvature = abs(bend[c, 1 - side, i])
                     if curvature != 0.0:
-                        cap[k] = min(cap[k], np.sqrt(ease[1, c] * acceleration[i] / curvature))
+                        cap[k] = min(cap[k], np.sqrt(ease[c, 1] * acceleration[i] / curvature))
 
 
 @kernel
@@ -142,51 +143,57 @@ def falling_jerk(first, third, straight_a, straight_b, jerk, ease, phases, cell,
                 q = first[k, end, i]
                 if q != 0.0:
                     own = third[k, i] * speed[k] ** 3 * (1.0 if q > 0.0 else -1.0)
-                    room = ease[4, k] * max(jerk[i] + own, LEAST_JERK_SHARE * jerk[i])
+                    room = ease[k, 4] * max(jerk[i] + own, LEAST_JERK_SHARE * jerk[i])
                     least[k] = min(least[k], room / abs(q))
 
 
 @kernel
-def tighten(worst, straight_a, tolerances, ease):
+def tighten(worst, straight_a, tolerances, ease, lower, changed, begin, end):
     """Lower what cells and their neighbours may use, where the law asked for too much; returns how many.
 
     Parameters
     ----------
     worst (k,7)
         Ratios of velocity, acceleration, feed; of jerk where b is 0, rises, falls; and of jerk but for b.
-    ease (5,k)
+    ease (k,5)
         Shares of speed, acceleration, jerk by curvature, rising and falling b that may be used.
+    lower (k,5), changed (k,)
+        Ones, before and after; and marks of the cells whose shares are lower now.
+    begin, end
+        Cells to look at.
 
     Too much jerk where b is not 0 is first of all b's affair: to lower the speed costs more.
     """
     count = straight_a.size
     found = 0
-    lower = np.ones((5, count))
-    for k in range(count):
+    for k in range(begin, end):
         fast = max(worst[k, 0], worst[k, 2])
         if fast > 1.0 + tolerances[0]:
-            lower[0, k] = EASE_ACCELERATION / fast
+            lower[k, 0] = EASE_ACCELERATION / fast
         if worst[k, 1] > 1.0 + tolerances[1]:
-            lower[1, k] = EASE_ACCELERATION / worst[k, 1]
+            lower[k, 1] = EASE_ACCELERATION / worst[k, 1]
         base = worst[k, 6]
         if max(base, worst[k, 3]) > 1.0 + tolerances[2]:
-            lower[2, k] = EASE_JERK / max(base, worst[k, 3])
+            lower[k, 2] = EASE_JERK / max(base, worst[k, 3])
         for n in range(2):
             ratio = worst[k, 4 + n]
             if ratio > 1.0 + tolerances[2]:
                 room = (1.0 - base) / (ratio - base) if ratio > base else 1.0
-                lower[3 + n, k] = EASE_JERK * min(1.0 / ratio, max(room, LEAST_ROOM))
+                lower[k, 3 + n] = EASE_JERK * min(1.0 / ratio, max(room, LEAST_ROOM))
                 if base > MOST_BASE:
-                    lower[2, k] = min(lower[2, k], EASE_JERK / ratio**BASE_POWER)
+                    lower[k, 2] = min(lower[k, 2], EASE_JERK / ratio**BASE_POWER)
         for n in range(5):
-            if lower[n, k] < 1.0:
+            if lower[k, n] < 1.0:
                 found += 1
                 break
     if found > 0:
-        for k in range(count):
+        for k in range(max(begin - 1, 0), min(end + 1, count)):
             for n in range(5):
-                least = lower[n, k]
+                least = lower[k, n]
                 if n > 0 and straight_a[k] == 0.0:
-                    least = min(least, min(lower[n, max(k - 1, 0)], lower[n, min(k + 1, count - 1)]))
-                ease[n, k] *= least
+                    least = min(least, min(lower[max(k - 1, 0), n], lower[min(k + 1, count - 1), n]))
+                if least < 1.0:
+                    ease[k, n] *= least
+                    changed[k] = 1
+        lower[begin:end] = 1.0
     return found

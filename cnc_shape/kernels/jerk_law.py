@@ -1,8 +1,12 @@
 """The time law of a path under a jerk limit: scans, rounding and certificate of every section.
 
 The scans guess what the acceleration will be when they ask how much jerk the curvature takes, so the
-finished law is looked at: where it asks for more than the limit, the cell and its neighbours may use less in
-the next round. Limits only fall, so this ends; straight cells never ask for too much.
+finished law is looked at: where it asks for more than the limit, the cell and its neighbours may use less.
+Limits only fall, so this ends; straight cells never ask for too much.
+
+What changes in a cell reaches as far as the next nodes on both sides that the law passes without
+acceleration, at a speed which is still allowed: there the law may be joined again. So only such windows
+are planned anew, and where a window has no law between the speeds at its ends, it grows to the next ones.
 """
 # pyright: basic
 
@@ -11,67 +15,106 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_caps import derivatives, falling_jerk, speed_caps, straight_jerk, tighten
 from cnc_shape.kernels.jerk_certificate import certificate
-from cnc_shape.kernels.jerk_phases import moved, time_to
-from cnc_shape.kernels.jerk_rounding import SHORTEST, round_off
+from cnc_shape.kernels.jerk_phases import moved
+from cnc_shape.kernels.jerk_pieces import NEAR, cut, index_pieces, more_room, spliced
+from cnc_shape.kernels.jerk_rounding import round_off
 from cnc_shape.kernels.jerk_scan import PHASES, envelope, mirrored, scan
 
-NEAR = 1e-10  # mm or rad, of a node: as good as there
+NO_ACCELERATION = 1e-9  # s, times the jerk: as good as none
+SAME_SPEED = 1e-10  # -
 
 
 @kernel
-def timed(pieces):
-    """Sum up the durations of pieces (m,6) to their times, with what rounding took away."""
-    time = 0.0
-    lost = 0.0
-    for m in range(pieces.shape[0]):
-        pieces[m, 0] = time
-        step = pieces[m, 1] - lost
-        following = time + step
-        lost = (following - time) - step
-        time = following
+def window_law(
+    size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, begin,
+    start, finish,
+):  # fmt: skip
+    """Pieces of the law of some cells, without acceleration at both ends; no pieces if there is none.
 
-
-@kernel
-def cut(law, law_cell, count, nodes, pieces, cell):
-    """Cut the phases of a law at the nodes: pieces of time 0, duration, place in the cell, v, a, b.
-
-    A phase that ends at a node but for rounding ends there. Every cell has a piece, however short it is.
+    Parameters
+    ----------
+    begin
+        Number of the first of the cells, from which they are counted in the output.
+    start, finish
+        Speeds at both ends.
     """
-    m = 0
-    k = 0
-    last = nodes.size - 2
-    for n in range(count):
-        whole = law[n, 0]
-        if whole < SHORTEST:
-            continue
-        origin = nodes[law_cell[n]]
-        place = law[n, 1]
-        v = law[n, 2]
-        a = law[n, 3]
-        b = law[n, 4]
-        end = place + moved(v, a, b, whole)
-        near = NEAR + 2e-16 * origin
-        begin = 0.0
-        while True:
-            to_node = nodes[k + 1] - origin
-            inside = k < last and to_node < end - near
-            until = begin
-            if not (k < last and to_node <= place + near):
-                until = time_to(v, a, b, whole, to_node - place) if inside else whole
-            if until - begin >= SHORTEST or (inside and (m == 0 or cell[m - 1] != k)):
-                pieces[m, 0] = 0.0
-                pieces[m, 1] = until - begin
-                pieces[m, 2] = 0.0 if begin > 0.0 else max(place - (nodes[k] - origin), 0.0)
-                pieces[m, 3] = max(v + begin * (a + begin * b / 2.0), 0.0)
-                pieces[m, 4] = a + b * begin
-                pieces[m, 5] = b
-                cell[m] = k
-                m += 1
-            if not inside:
-                break
-            k += 1
-            begin = until
-    return m
+    count = size.size
+    own_cap = cap.copy()
+    own_cap[0] = start
+    own_cap[count] = finish
+    rising = np.empty((PHASES * count, 5))
+    falling = np.empty((PHASES * count, 5))
+    rising_cell = np.empty(PHASES * count, np.int64)
+    falling_cell = np.empty(PHASES * count, np.int64)
+    nodes = np.zeros(count + 1)
+    for k in range(count):
+        nodes[k + 1] = nodes[k] + size[k]
+    r = scan(
+        size, top, own_cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, rising,
+        rising_cell,
+    )  # fmt: skip
+    f = scan(
+        size[::-1].copy(), top[::-1].copy(), own_cap[::-1].copy(), straight_a[::-1].copy(),
+        straight_b[::-1].copy(), -first[::-1, ::-1].copy(), bend[::-1, ::-1].copy(), -third[::-1].copy(),
+        acceleration, jerk, ease[::-1].copy(), falling, falling_cell,
+    )  # fmt: skip
+    mirrored(falling, falling_cell, f, size)
+    upper = np.empty((r + f + count, 5))
+    upper_cell = np.empty(r + f + count, np.int64)
+    u = envelope(rising, rising_cell, r, falling, falling_cell, f, size, upper, upper_cell)
+    least = np.empty(count)
+    falling_jerk(first, third, straight_a, straight_b, jerk, ease, upper, upper_cell, u, least)
+    law = np.empty((2 * u + 4, 5))
+    law_cell = np.empty(2 * u + 4, np.int64)
+    w = round_off(upper, upper_cell, u, nodes, least, law, law_cell)
+    pieces = np.empty((w + count, 6))
+    cell = np.empty(w + count, np.int64)
+    if w == 0:
+        return pieces[:0], cell[:0]
+    last = law[w - 1]
+    t = last[0]
+    off = (nodes[law_cell[w - 1]] + last[1] + moved(last[2], last[3], last[4], t)) - nodes[count]
+    slow = max(abs(law[0, 2] - start), abs(last[2] + t * (last[3] + t * last[4] / 2.0) - finish))
+    turned = max(abs(law[0, 3]), abs(last[3] + last[4] * t))
+    steepest = max(abs(law[0, 4]), max(abs(last[4]), least[count - 1]))
+    if abs(off) > NEAR or slow > SAME_SPEED * (1.0 + finish) or turned > NO_ACCELERATION * steepest:
+        return pieces[:0], cell[:0]
+    m = cut(law, law_cell, w, nodes, begin, pieces, cell)
+    return pieces[:m], cell[:m]
+
+
+@kernel
+def joint_speed(pieces, first_piece, cap, node, cells):
+    """Speed at a node where the law may be joined; -1 where it may not."""
+    if node == 0 or node == cells:
+        return 0.0
+    before = first_piece[node] - 1
+    after = first_piece[node]
+    if pieces[before, 4] != 0.0 or pieces[before, 5] != 0.0:
+        return -1.0
+    if pieces[after, 4] != 0.0 or pieces[after, 5] != 0.0 or pieces[after, 3] != pieces[before, 3]:
+        return -1.0
+    return pieces[after, 3] if pieces[after, 3] <= cap[node] else -1.0
+
+
+@kernel
+def joint_before(pieces, first_piece, cap, node, cells):
+    """The nearest node at or before `node` where the law may be joined, and its speed there."""
+    while True:
+        speed = joint_speed(pieces, first_piece, cap, node, cells)
+        if speed >= 0.0:
+            return node, speed
+        node -= 1
+
+
+@kernel
+def joint_after(pieces, first_piece, cap, node, cells):
+    """The nearest node at or after `node` where the law may be joined, and its speed there."""
+    while True:
+        speed = joint_speed(pieces, first_piece, cap, node, cells)
+        if speed >= 0.0:
+            return node, speed
+        node += 1
 
 
 @kernel
@@ -92,13 +135,14 @@ def section_law(
     -------
     pieces (m,6), cell (m,)
         0, duration, place in the cell, v, a, b; the cell counted from `begin`.
-    rounds
+    work
+        Cells planned, over all rounds.
     found
         Cells that still ask for too much.
     """
     count = end - begin
     d = acceleration.size
-    size = length[begin:end]
+    size = length[begin:end].copy()
     first = np.empty((count, 2, d))
     bend = np.empty((count, 2, d))
     third = np.empty((count, d))
@@ -107,57 +151,99 @@ def section_law(
     straight_b = np.empty(count)
     limits = limit_v2[begin:end]
     straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
-    nodes = np.zeros(count + 1)
-    for k in range(count):
-        nodes[k + 1] = nodes[k] + size[k]
-    back_first = -first[::-1, ::-1].copy()
-    back_bend = bend[::-1, ::-1].copy()
-    back_third = -third[::-1].copy()
-    back_size = size[::-1].copy()
-    own_size = size.copy()
-    back_straight_a = straight_a[::-1].copy()
-    back_straight_b = straight_b[::-1].copy()
-    ease = np.ones((5, count))
+    ease = np.ones((count, 5))
+    lower = np.ones((count, 5))
+    changed = np.zeros(count, np.int64)
+    worst = np.empty((count, 7))
     top = np.empty(count)
     cap = np.empty(count + 1)
-    least = np.empty(count)
-    rising = np.empty((PHASES * count, 5))
-    falling = np.empty((PHASES * count, 5))
-    upper = np.empty((2 * PHASES * count, 5))
-    rising_cell = np.empty(PHASES * count, np.int64)
-    falling_cell = np.empty(PHASES * count, np.int64)
-    upper_cell = np.empty(2 * PHASES * count, np.int64)
-    law = np.empty((4 * PHASES * count + 4, 5))
-    law_cell = np.empty(4 * PHASES * count + 4, np.int64)
-    pieces = np.empty((4 * PHASES * count + 4 + count, 6))
-    cell = np.empty(4 * PHASES * count + 4 + count, np.int64)
-    worst = np.empty((count, 7))
-    rounds = 0
-    found = 1
-    m = 0
+    speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, 0, count, top, cap)
+    pieces, cell = window_law(
+        size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, 0, 0.0, 0.0
+    )
+    work = count
+    if cell.size == 0:
+        return pieces, cell, work, count
+    certificate(
+        pieces, cell, 0, cell.size, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
+        1.0 + tolerances[2], worst,
+    )  # fmt: skip
+    found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
+    first_piece = np.zeros(count + 1, np.int64)
+    new = np.empty((count + 64, 6))
+    new_cell = np.empty(count + 64, np.int64)
+    windows = np.empty((count + 1, 4), np.int64)  # first cell, end, first new piece, end
+    starts = np.empty(count + 1)
+    rounds = 1
     while found > 0 and rounds < most_rounds:
         rounds += 1
-        speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, top, cap)
-        r = scan(
-            own_size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease,
-            rising, rising_cell,
-        )  # fmt: skip
-        f = scan(
-            back_size, top[::-1].copy(), cap[::-1].copy(), back_straight_a, back_straight_b, back_first,
-            back_bend, back_third, acceleration, jerk, ease[:, ::-1].copy(), falling,
-            falling_cell,
-        )  # fmt: skip
-        mirrored(falling, falling_cell, f, own_size)
-        u = envelope(rising, rising_cell, r, falling, falling_cell, f, own_size, upper, upper_cell)
-        falling_jerk(first, third, straight_a, straight_b, jerk, ease, upper, upper_cell, u, least)
-        w = round_off(upper, upper_cell, u, nodes, least, law, law_cell)
-        m = cut(law, law_cell, w, nodes, pieces, cell)
-        certificate(
-            pieces, cell, m, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
-            1.0 + tolerances[2], worst,
-        )  # fmt: skip
-        found = tighten(worst, straight_a, tolerances, ease)
-    return pieces[:m], cell[:m], rounds, found
+        index_pieces(cell, cell.size, first_piece, count)
+        k = 0
+        while k < count:
+            until = k
+            while until < count and changed[until] == 1:
+                until += 1
+            if until > k:
+                speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, k, until, top, cap)
+            k = until + 1
+        made = 0
+        filled = 0
+        k = 0
+        while k < count:
+            if changed[k] == 0:
+                k += 1
+                continue
+            high = k
+            while high < count and changed[high] == 1:
+                high += 1
+            low, start = joint_before(pieces, first_piece, cap, k, count)
+            high, finish = joint_after(pieces, first_piece, cap, high, count)
+            while True:
+                while made > 0 and low < windows[made - 1, 1]:
+                    made -= 1
+                    filled = windows[made, 2]
+                    low = min(low, windows[made, 0])
+                    start = starts[made] if low == windows[made, 0] else start
+                work += high - low
+                part, part_cell = window_law(
+                    size[low:high], top[low:high], cap[low : high + 1], straight_a[low:high],
+                    straight_b[low:high], first[low:high], bend[low:high], third[low:high], acceleration,
+                    jerk, ease[low:high], low, start, finish,
+                )  # fmt: skip
+                if part_cell.size > 0:
+                    break
+                if low == 0 and high == count:
+                    return pieces[:0], cell[:0], work, count
+                grown = high - low
+                low, start = joint_before(pieces, first_piece, cap, max(low - grown, 0), count)
+                high, finish = joint_after(pieces, first_piece, cap, min(high + grown, count), count)
+            if filled + part_cell.size > new_cell.size:
+                new, new_cell = more_room(new, new_cell, part_cell.size)
+            for m in range(part_cell.size):
+                for column in range(6):
+                    new[filled + m, column] = part[m, column]
+                new_cell[filled + m] = part_cell[m]
+            starts[made] = start
+            windows[made, 0] = low
+            windows[made, 1] = high
+            windows[made, 2] = filled
+            filled += part_cell.size
+            windows[made, 3] = filled
+            made += 1
+            k = high
+        pieces, cell = spliced(pieces, cell, first_piece, windows, made, new, new_cell)
+        index_pieces(cell, cell.size, first_piece, count)
+        changed[:] = 0
+        found = 0
+        for n in range(made):
+            low = windows[n, 0]
+            high = windows[n, 1]
+            certificate(
+                pieces, cell, first_piece[low], first_piece[high], rows, begin, feed_rate, alone, velocity,
+                acceleration, jerk, 1.0 + tolerances[2], worst,
+            )  # fmt: skip
+            found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
+    return pieces, cell, work, found
 
 
 @kernel
@@ -207,16 +293,3 @@ def path_law(
             filled += cell.size
         begin = end
     return out[:filled], out_cell[:filled], stuck
-
-
-@kernel
-def more_room(out, out_cell, count):
-    """Return both arrays with room for twice as many pieces, and `count` at least."""
-    size = out_cell.size
-    more = np.empty((2 * size + count, 6))
-    more_cell = np.empty(2 * size + count, np.int64)
-    for n in range(size):
-        for column in range(6):
-            more[n, column] = out[n, column]
-        more_cell[n] = out_cell[n]
-    return more, more_cell

@@ -206,7 +206,7 @@ def arc(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
 
 @kernel
 def round_off(phases, cell, count, nodes, least_jerk, law, law_cell):
-    """Round the steps of an envelope; returns how many phases the law has.
+    """Round the steps of an envelope; returns how many phases the law has, 0 if it has none.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def round_off(phases, cell, count, nodes, least_jerk, law, law_cell):
                     m -= 1
                     joined = False
                     continue
-                t1 = 0.0
+                return 0
             law[p, 0] = t1
             a1 = ap + bp * t1
             v1 = vp + t1 * (ap + t1 * bp / 2.0)

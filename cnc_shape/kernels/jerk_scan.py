@@ -23,7 +23,7 @@ def scan(
     length, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease,
     phases, cell,
 ):  # fmt: skip
-    """Run up a path from rest; returns how many phases were written.
+    """Run up a path from its first cap; returns how many phases were written.
 
     Parameters
     ----------
@@ -36,13 +36,13 @@ def scan(
         speed.
     first, bend (k,2,d), third (k,d)
         q' and q'' at both ends of the cells, q'''.
-    ease (5,k)
+    ease (k,5)
         Shares of the limits that may be used on curved cells (`jerk_caps.tighten`).
     phases (m,5), cell (m,)
         Output: duration, place in the cell, speed, acceleration, jerk.
     """
     m = 0
-    v = 0.0
+    v = cap[0]
     a = 0.0
     for k in range(length.size):
         h = length[k]
@@ -52,7 +52,7 @@ def scan(
             steep = straight_b[k]
         else:
             high, steep = curved_caps(
-                first[k], bend[k], third[k], h, v, a, cap[k + 1], acceleration, jerk, ease[:, k]
+                first[k], bend[k], third[k], h, v, a, cap[k + 1], acceleration, jerk, ease[k]
             )
         a = min(a, high)
         before = m
