@@ -67,8 +67,8 @@ def window_law(
     law = np.empty((2 * u + 4, 5))
     law_cell = np.empty(2 * u + 4, np.int64)
     w = round_off(upper, upper_cell, u, nodes, least, law, law_cell)
-    pieces = np.empty((w + count, 6))
-    cell = np.empty(w + count, np.int64)
+    pieces = np.empty((w + count + 1, 6))
+    cell = np.empty(w + count + 1, np.int64)
     if w == 0:
         return pieces[:0], cell[:0]
     last = law[w - 1]

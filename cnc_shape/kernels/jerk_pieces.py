@@ -64,6 +64,16 @@ def cut(law, law_cell, count, nodes, first, pieces, cell):
                 break
             k += 1
             begin = until
+    while m > 0 and cell[m - 1] < first + last:  # cells at the end that are shorter than rounding
+        t = pieces[m - 1, 1]
+        pieces[m, 0] = 0.0
+        pieces[m, 1] = 0.0
+        pieces[m, 2] = 0.0
+        pieces[m, 3] = max(pieces[m - 1, 3] + t * (pieces[m - 1, 4] + t * pieces[m - 1, 5] / 2.0), 0.0)
+        pieces[m, 4] = pieces[m - 1, 4] + t * pieces[m - 1, 5]
+        pieces[m, 5] = 0.0
+        cell[m] = cell[m - 1] + 1
+        m += 1
     return m
 
 
