@@ -19,7 +19,9 @@ from cnc_shape.jerk import jerk_violation, plan_jerk
 from cnc_shape.kernels.jerk_rounding import round_off
 from cnc_shape.limits import Limits
 from cnc_shape.program import PathMode
+from cnc_shape.readers import read_program
 from cnc_shape.smoothing import Path, Smoothing, smooth
+from cnc_shape.toolpath import build_toolpath
 from cnc_shape.trajectory import sample
 
 MILL_J = [Limits(200.0, 2000.0, 5e4)] * 3  # j = 25 a
@@ -101,6 +103,18 @@ def test_a_zigzag_within_the_tolerance_is_a_straight_but_for_its_last_blocks():
     points = np.column_stack([0.02 * np.arange(n + 1), 0.004 * (np.arange(n + 1) % 2)])
     expected = naive.rest_to_rest(100.0, 100.0, 2000.0, 5e4)
     assert_allclose(planned(lines(points)).end_time, expected, rtol=0, atol=0.04)
+
+
+@pytest.mark.parametrize(
+    "name", ["lcnc_boat_xyzbc.ngc", "lcnc_lathe_pawn.ngc", "ugs_no_spaces.gcode", "lcnc_cds.ngc"]
+)
+@pytest.mark.parametrize("limits", [MILL_J, UNLIKE], ids=["mill", "unlike"])
+def test_real_programs_keep_every_limit(shared, name, limits):
+    whole = build_toolpath(read_program(shared / "data" / "gcode" / "programs" / name))
+    every = [*limits, *[Limits(3.0, 30.0, 750.0)] * 3][: len(whole.axes)]
+    profile = planned(whole, every)
+    assert_keeps(profile, every)
+    assert 1.0 <= profile.end_time / plan(profile.path, every).end_time <= 1.03
 
 
 def corners(seed, n=10):

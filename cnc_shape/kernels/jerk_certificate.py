@@ -112,13 +112,26 @@ def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, w
 
 @kernel
 def certificate(
-    pieces, cell, begin, end, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk, enough, worst
+    pieces,
+    cell,
+    begin,
+    end,
+    straight_a,
+    rows,
+    first_cell,
+    feed_rate,
+    alone,
+    velocity,
+    acceleration,
+    jerk,
+    enough,
+    worst,
 ):
     """Largest ratios (k,7) of what the law asks for to the limits, in the cells of pieces `begin` to `end`.
 
     Velocity, acceleration, feed; jerk where the path jerk b is 0, where it is positive, where it is
     negative; jerk but for that by b. The jerks are bounds, as near as it takes to tell them from `enough`;
-    the others are looked for at some points of every piece.
+    the others are looked for at some points of every piece. Straight cells keep their limits by construction.
     """
     for m in range(begin, end):
         worst[cell[m], :] = 0.0
@@ -128,6 +141,8 @@ def certificate(
     loads = np.empty(4)
     for m in range(begin, end):
         k = cell[m]
+        if straight_a[k] > 0.0:
+            continue
         whole = first_cell + k
         s = pieces[m, 2]
         v = pieces[m, 3]

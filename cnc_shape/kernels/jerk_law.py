@@ -165,7 +165,7 @@ def section_law(
     if cell.size == 0:
         return pieces, cell, work, count
     certificate(
-        pieces, cell, 0, cell.size, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
+        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
         1.0 + tolerances[2], worst,
     )  # fmt: skip
     found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
@@ -239,8 +239,8 @@ def section_law(
             low = windows[n, 0]
             high = windows[n, 1]
             certificate(
-                pieces, cell, first_piece[low], first_piece[high], rows, begin, feed_rate, alone, velocity,
-                acceleration, jerk, 1.0 + tolerances[2], worst,
+                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
+                alone, velocity, acceleration, jerk, 1.0 + tolerances[2], worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
     return pieces, cell, work, found
