@@ -23,7 +23,7 @@ from cnc_shape.limits import Limits
 from cnc_shape.smoothing import Path
 
 RISE_TIME = 1e-6  # s, in which an axis without jerk limit reaches its acceleration
-TOLERANCES = frozen([1e-9, 1e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
+TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
 MOST_ROUNDS = 100  # of lowering the limits of cells
 
 

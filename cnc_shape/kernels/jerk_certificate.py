@@ -16,13 +16,15 @@ SMALLEST_SHARE = 1.0 / 64.0  # -, of a piece that is halved
 
 @kernel
 def in_bernstein(powers, out):
-    """Bernstein coefficients of degree 6 of a polynomial on [0, 1], from its powers (7,)."""
-    for i in range(7):
+    """Bernstein coefficients (n+1,) of a polynomial of degree n on [0, 1], from its powers (n+1,)."""
+    degree = out.size - 1
+    for i in range(degree + 1):
         value = 0.0
-        share = 1.0  # binomial(i, k) over binomial(6, k)
+        share = 1.0  # binomial(i, k) over binomial(degree, k)
         for k in range(i + 1):
             value += share * powers[k]
-            share *= (i - k) / (6.0 - k) if k < 6 else 0.0
+            if k < degree:
+                share *= (i - k) / (degree - k)
         out[i] = value
 
 
@@ -94,6 +96,59 @@ def jerk_bound(c, s, v, a, b, t, jerk, enough, powers, parts, waiting):
 
 
 @kernel
+def acceleration_bound(c, s, v, a, b, t, acceleration, enough, powers, parts, waiting):
+    """The same for ``q' a + q'' v^2``, of degree 7; `powers` and `parts` (5,8) are scratch."""
+    found = 0.0
+    waiting[0, 0] = 0.0
+    waiting[0, 1] = 1.0
+    count = 1
+    while count > 0:
+        count -= 1
+        begin = waiting[count, 0]
+        share = waiting[count, 1]
+        e = begin * t
+        h = share * t
+        here_v = v + e * (a + e * b / 2.0)
+        here_a = a + e * b
+        place = (s + moved(v, a, b, e), here_v * h, here_a * h * h / 2.0, b * h * h * h / 6.0)
+        speed = (here_v, here_a * h, b * h * h / 2.0)
+        powers[:] = 0.0
+        powers[0, 0] = here_a
+        powers[0, 1] = b * h
+        for n in range(3):
+            for k in range(3):
+                powers[3, n + k] += speed[n] * speed[k]
+        for n in range(4):
+            for k in range(2):
+                powers[1, n + k] += place[n] * powers[0, k]
+            for k in range(5):
+                powers[4, n + k] += place[n] * powers[3, k]
+        for n in range(4):
+            for k in range(5):
+                powers[2, n + k] += place[n] * powers[1, k]
+        for n in range(5):
+            in_bernstein(powers[n], parts[n])
+        bound = 0.0
+        sure = 0.0
+        for i in range(acceleration.size):
+            for n in range(8):
+                load = c[1, i] * parts[0, n] + 2.0 * c[2, i] * (parts[1, n] + parts[3, n])
+                load += 3.0 * c[3, i] * (parts[2, n] + 2.0 * parts[4, n])
+                load = abs(load) / acceleration[i]
+                bound = max(bound, load)
+                if n == 0 or n == 7:
+                    sure = max(sure, load)
+        if bound > enough and sure <= enough and share > SMALLEST_SHARE:
+            for half in range(2):
+                waiting[count, 0] = begin + half * 0.5 * share
+                waiting[count, 1] = 0.5 * share
+                count += 1
+        else:
+            found = max(found, bound)
+    return found
+
+
+@kernel
 def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, worst):
     """Raise `worst` (4,) to a point's ratios of velocity, acceleration, jerk and feed to their limits."""
     square = 0.0
@@ -124,19 +179,22 @@ def certificate(
     velocity,
     acceleration,
     jerk,
-    enough,
+    tolerances,
     worst,
 ):
     """Largest ratios (k,7) of what the law asks for to the limits, in the cells of pieces `begin` to `end`.
 
     Velocity, acceleration, feed; jerk where the path jerk b is 0, where it is positive, where it is
-    negative; jerk but for that by b. The jerks are bounds, as near as it takes to tell them from `enough`;
-    the others are looked for at some points of every piece. Straight cells keep their limits by construction.
+    negative; jerk but for that by b. Acceleration and jerks are bounds, as near as it takes to tell them
+    from what is tolerated; the others are looked for at some points of every piece. Straight cells keep
+    their limits by construction.
     """
     for m in range(begin, end):
         worst[cell[m], :] = 0.0
     powers = np.empty((5, 7))
     parts = np.empty((5, 7))
+    more_powers = np.empty((5, 8))
+    more_parts = np.empty((5, 8))
     waiting = np.empty((64, 2))
     loads = np.empty(4)
     for m in range(begin, end):
@@ -157,10 +215,15 @@ def certificate(
                 velocity, acceleration, jerk, feed_rate[whole], loads,
             )  # fmt: skip
         worst[k, 0] = max(worst[k, 0], loads[0])
+        if loads[1] <= 1.0 + tolerances[1]:
+            loads[1] = acceleration_bound(
+                rows[whole], s, v, a, b, t, acceleration, 1.0 + tolerances[1], more_powers, more_parts,
+                waiting,
+            )  # fmt: skip
         worst[k, 1] = max(worst[k, 1], loads[1])
         worst[k, 2] = max(worst[k, 2], loads[3])
         worst[k, 6] = max(worst[k, 6], loads[2])
-        bound = jerk_bound(rows[whole], s, v, a, b, t, jerk, enough, powers, parts, waiting)
+        bound = jerk_bound(rows[whole], s, v, a, b, t, jerk, 1.0 + tolerances[2], powers, parts, waiting)
         n = 3 if b == 0.0 else (4 if b > 0.0 else 5)
         worst[k, n] = max(worst[k, n], bound)
 

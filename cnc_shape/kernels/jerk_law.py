@@ -166,7 +166,7 @@ def section_law(
         return pieces, cell, work, count
     certificate(
         pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
-        1.0 + tolerances[2], worst,
+        tolerances, worst,
     )  # fmt: skip
     found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
     first_piece = np.zeros(count + 1, np.int64)
@@ -240,7 +240,7 @@ def section_law(
             high = windows[n, 1]
             certificate(
                 pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
-                alone, velocity, acceleration, jerk, 1.0 + tolerances[2], worst,
+                alone, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
     return pieces, cell, work, found
