@@ -19,6 +19,7 @@ STRAIGHT_JERK_SHARE = 1e-5  # -, of the jerk limit that the curvature of a strai
 EASE_ACCELERATION = 0.999  # -, over the excess
 EASE_JERK = 0.995
 LEAST_ROOM = 0.5
+LEAST_EASE = 0.02  # -, of b: with less it has no digits left, and the speed is lowered instead
 MOST_BASE = 0.8
 BASE_POWER = 0.25
 
@@ -180,6 +181,9 @@ def tighten(worst, straight_a, tolerances, ease, lower, changed, begin, end):
             if ratio > 1.0 + tolerances[2]:
                 room = (1.0 - base) / (ratio - base) if ratio > base else 1.0
                 lower[k, 3 + n] = EASE_JERK * min(1.0 / ratio, max(room, LEAST_ROOM))
+                if ease[k, 3 + n] < LEAST_EASE:
+                    lower[k, 3 + n] = 1.0
+                    lower[k, 2] = min(lower[k, 2], EASE_JERK / ratio)
                 if base > MOST_BASE:
                     lower[k, 2] = min(lower[k, 2], EASE_JERK / ratio**BASE_POWER)
         for n in range(5):
