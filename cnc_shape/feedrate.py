@@ -105,7 +105,7 @@ def planning(
     acceleration = frozen([limit.acceleration for limit in limits])
 
     def step(state: PlanningState | None, path: Path, last: bool) -> tuple[PlanningState | None, Profile]:
-        _check(path, velocity, acceleration)
+        check_executable(path, (("velocity", velocity), ("acceleration", acceleration)))
         before = state or PlanningState((), frozen(np.zeros(3)), np.inf, PATIENCE, 0)
         parts = (*before.parts, path) if len(path) else before.parts
         gathered = sum(len(part) for part in parts)
@@ -234,9 +234,16 @@ def _gentle(
     return frozen(path.coefficients / factor[:, None, None]), frozen(feed_rate / np.sqrt(factor))
 
 
-def _check(path: Path, velocity: FloatArray, acceleration: FloatArray) -> None:
-    if velocity.size != len(path.axes):
-        raise ValueError(f"{velocity.size} limits for the axes {path.axes}")
+def check_executable(path: Path, limits: Sequence[tuple[str, FloatArray]]) -> None:
+    """Refuse a path without feed, or one that moves an axis whose limit is 0.
+
+    Raises
+    ------
+    InfeasibleError
+        Names the line.
+    """
+    if any(values.size != len(path.axes) for _, values in limits):
+        raise ValueError(f"{limits[0][1].size} limits for the axes {path.axes}")
     moves = path.length > 0.0
     idle = moves & ~(path.feed_rate > 0.0)
     if idle.any():
@@ -247,13 +254,13 @@ def _check(path: Path, velocity: FloatArray, acceleration: FloatArray) -> None:
             line=int(path.line[first]),
         )
     for column, axis in enumerate(path.axes):
-        for name, limit in (("velocity", velocity[column]), ("acceleration", acceleration[column])):
-            if limit > 0.0:
+        for name, values in limits:
+            if values[column] > 0.0:
                 continue
             used: BoolArray = moves & (path.coefficients[:, 1:, column] != 0.0).any(axis=1)
             if used.any():
                 raise InfeasibleError(
-                    f"{axis.upper()} moves, but its {name} limit is {limit:g}",
+                    f"{axis.upper()} moves, but its {name} limit is {values[column]:g}",
                     hint=f"give the axis a {name} limit above 0",
                     line=int(path.line[int(np.argmax(used))]),
                 )

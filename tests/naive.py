@@ -939,3 +939,176 @@ def normal_noise(seed, joint, tick):
     one, other = (random_word(seed, joint, 2 * tick + k) // 2**11 for k in (0, 1))
     radius = math.sqrt(-2.0 * math.log((one + 0.5) / 2**53))
     return radius * math.cos(2.0 * math.pi * (other / 2**53))
+
+
+# --- jerk-limited time law ----------------------------------------------------------------------------
+
+
+def rest_to_rest(d, v, a, j):
+    """Shortest time over `d` from rest to rest within speed, acceleration and jerk; seven phases or fewer."""
+    rise = a / j + v / a if v * j >= a * a else 2 * np.sqrt(v / j)
+    if v * rise <= d:
+        return d / v + rise
+    if d >= 2 * a**3 / j**2:
+        peak = 2 * a * d / (np.sqrt(a**4 / j**2 + 4 * a * d) + a * a / j)
+        return 2 * (a / j + peak / a)
+    return 4 * np.cbrt(d / (2 * j))
+
+
+def law_loads(profile, limits, points):
+    """Largest ratios of velocity, acceleration, jerk and feed to their limits, piece by piece."""
+    bounds = np.array([[limit.velocity, limit.acceleration, limit.jerk] for limit in limits]).T
+    worst = np.zeros(4)
+    for m in range(len(profile)):
+        k = profile.cell[m]
+        e = profile.duration[m] * np.linspace(0.0, 1.0, points)
+        b = profile.jerk[m]
+        law = np.poly1d([b / 6, profile.acceleration[m] / 2, profile.velocity[m], profile.u[m]])
+        s, v, a = law(e), law.deriv()(e), law.deriv(2)(e)
+        c = profile.path.coefficients[k]
+        third = np.broadcast_to(6 * c[3], (points, len(limits)))
+        second = 2 * c[2] + s[:, None] * third
+        first = c[1] + 2 * np.outer(s, c[2]) + 3 * np.outer(s**2, c[3])
+        asked = [
+            first * v[:, None],
+            first * a[:, None] + second * (v**2)[:, None],
+            first * b + 3 * second * (v * a)[:, None] + third * (v**3)[:, None],
+        ]
+        alone = profile.path.stretch[k] == 0.0
+        feed = np.linalg.norm(asked[0][:, 3:] if alone else asked[0][:, :3], axis=1)
+        ratios = [(np.abs(row) / bound).max() for row, bound in zip(asked, bounds, strict=True)]
+        worst = np.maximum(worst, [*ratios, feed.max() / profile.path.feed_rate[k]])
+    return worst
+
+
+def speeds_at(profile, places):
+    """Squared path speed at `places`, counted from the start of the program, by bisection."""
+    border = np.concatenate([[0.0], np.cumsum(profile.path.length)])
+    start = border[profile.cell] + profile.u
+    squares = []
+    for place in places:
+        m = max(np.searchsorted(start, place, side="right") - 1, 0)
+        law = np.poly1d(
+            [profile.jerk[m] / 6, profile.acceleration[m] / 2, profile.velocity[m], start[m] - place]
+        )
+        low, high = 0.0, profile.duration[m]
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if law(middle) < 0.0 else (low, middle)
+        squares.append(law.deriv()(low) ** 2)
+    return np.array(squares)
+
+
+def fastest_with_jerk(path, limits, first_guess, most_rounds=8):
+    """Time from rest to rest through the nodes of a path without stops, by linear programs in x = v^2.
+
+    At every node, from both sides, ``|q' x'/2 + q'' x| <= A`` and ``|q' x''/2 + 3 q'' x'/2 + q''' x| <= J/v``;
+    1/v is convex in x, so its tangent at the last solution is a stricter limit, and the next solution is
+    feasible again. x is taken as linear between the nodes, so it is an estimate.
+    """
+    from scipy import sparse
+    from scipy.optimize import linprog
+
+    moving = path.length > 0.0
+    c, h = path.coefficients[moving], path.length[moving]
+    n = h.size
+    reach = np.array([[limit.velocity, limit.acceleration, limit.jerk] for limit in limits]).T
+    ends = [
+        (c[:, 1] + e * (2 * c[:, 2] + 3 * e * c[:, 3]), 2 * c[:, 2] + 6 * e * c[:, 3], 6 * c[:, 3])
+        for e in (np.zeros((n, 1)), h[:, None])
+    ]
+    at = [sparse.eye(n, n + 1, k).tocsr() for k in (0, 1)]
+    slope = sparse.diags(0.5 / h) @ (at[1] - at[0])  # acceleration in the cells
+    before, after = h[:-1], h[1:]
+    mean = sparse.diags(after / (before + after)) @ slope[:-1]
+    mean += sparse.diags(before / (before + after)) @ slope[1:]
+    change = sparse.diags(2.0 / (before + after)) @ (slope[1:] - slope[:-1])
+    fixed, fixed_bound, bent, bent_bound = [], [], [], []
+    cap = np.full(n + 1, np.inf)
+    for side, (first, second, third) in enumerate(ends):
+        inner = slice(1, None) if side == 0 else slice(None, -1)
+        speed = np.linalg.norm(first, axis=1)
+        nodes = slice(0, n) if side == 0 else slice(1, n + 1)
+        cap[nodes] = np.minimum(cap[nodes], (path.feed_rate[moving] / speed) ** 2)
+        for i, (velocity, acceleration, jerk) in enumerate(reach.T):
+            with np.errstate(divide="ignore"):
+                cap[nodes] = np.minimum(cap[nodes], (velocity / np.abs(first[:, i])) ** 2)
+            row = sparse.diags(first[:, i]) @ slope + sparse.diags(second[:, i]) @ at[side]
+            fixed += [row, -row]
+            fixed_bound += [np.full(2 * n, acceleration)]
+            row = sparse.diags(first[inner, i]) @ change + sparse.diags(3.0 * second[inner, i]) @ mean
+            row += sparse.diags(third[inner, i]) @ at[0][1:]
+            bent += [row]
+            bent_bound += [jerk]
+    cap[[0, -1]] = 0.0
+
+    def time(x):
+        v = np.sqrt(x)
+        steps = 2.0 * h / (v[1:] + v[:-1])
+        return steps.sum() + 0.5 * (steps[0] + steps[-1])  # from rest with constant jerk: x ~ u^(4/3)
+
+    x, times = first_guess.copy(), []
+    for _ in range(most_rounds):
+        inside = np.maximum(x[1:-1], 1e-3)
+        rows, bounds = list(fixed), list(fixed_bound)
+        for row, jerk in zip(bent, bent_bound, strict=True):
+            tangent = sparse.diags(0.5 * jerk * inside**-1.5) @ at[0][1:]
+            rows += [row + tangent, tangent - row]
+            bounds += [np.tile(1.5 * jerk * inside**-0.5, 2)]
+        matrix = sparse.vstack(rows).tocsr()
+        scale = 1.0 / np.maximum(np.abs(matrix).max(axis=1).toarray().ravel(), 1e-12)
+        cost = np.concatenate([[0.0], -(inside**-1.5) * (before + after), [0.0]])
+        high = np.minimum(cap, np.maximum(3.0 * x, 1.0))
+        result = linprog(
+            cost / np.abs(cost).max(), sparse.diags(scale) @ matrix, scale * np.concatenate(bounds),
+            bounds=np.column_stack([np.minimum(0.3 * x, high), high]), method="highs-ipm",
+        )  # fmt: skip
+        assert result.x is not None, result.message
+        x = np.maximum(result.x, 0.0)
+        x[[0, -1]] = 0.0
+        times.append(time(x))
+        if len(times) > 1 and abs(times[-1] - times[-2]) <= 1e-4 * times[-1]:
+            break
+    return min(times)
+
+
+def highest_below(place, speed, jerk, at):
+    """Highest speed at `at` of a law that is nowhere above the points (place, speed) and keeps ``b >= -jerk``.
+
+    It is that of the highest arc ``b = -jerk`` through `at` that stays below the points. Seen from `at`, an
+    arc with the speed v there must not rise faster than the points ahead allow, nor come up more slowly than
+    those behind do: both bounds of its acceleration are those of single points.
+    """
+    ahead, behind = place > at, place < at
+
+    def speed_after(v, a, distance):
+        rest = (a + np.sqrt(a * a + 2 * jerk * v)) / jerk
+        low, high = np.zeros_like(distance), np.full_like(distance, rest)
+        if v * rest + a * rest**2 / 2 - jerk * rest**3 / 6 <= distance.min():
+            return np.zeros_like(distance)
+        for _ in range(30):
+            t = 0.5 * (low + high)
+            short = v * t + a * t * t / 2 - jerk * t**3 / 6 < distance
+            low, high = np.where(short, t, low), np.where(short, high, t)
+        return np.maximum(v + a * t - jerk * t * t / 2, 0.0)
+
+    def below(v, a):
+        fits = (speed_after(v, a, place[ahead] - at) <= speed[ahead] + 1e-6).all()
+        return fits, (speed_after(v, -a, (at - place[behind])[::-1]) <= speed[behind][::-1] + 1e-6).all()
+
+    low, high = 0.0, np.interp(at, place, speed)
+    for _ in range(25):
+        v = 0.5 * (low + high)
+        least, most = -1e5, 1e5
+        found = False
+        for _ in range(30):
+            a = 0.5 * (least + most)
+            before_end, after_start = below(v, a)
+            if before_end and after_start:
+                found = True
+                break
+            if not before_end and not after_start:
+                break
+            least, most = (least, a) if not before_end else (a, most)
+        low, high = (v, high) if found else (low, v)
+    return low

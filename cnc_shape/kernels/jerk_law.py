@@ -1,0 +1,295 @@
+"""The time law of a path under a jerk limit: scans, rounding and certificate of every section.
+
+The scans guess what the acceleration will be when they ask how much jerk the curvature takes, so the
+finished law is looked at: where it asks for more than the limit, the cell and its neighbours may use less.
+Limits only fall, so this ends; straight cells never ask for too much.
+
+What changes in a cell reaches as far as the next nodes on both sides that the law passes without
+acceleration, at a speed which is still allowed: there the law may be joined again. So only such windows
+are planned anew, and where a window has no law between the speeds at its ends, it grows to the next ones.
+"""
+# pyright: basic
+
+import numpy as np
+
+from cnc_shape.kernels import kernel
+from cnc_shape.kernels.jerk_caps import derivatives, falling_jerk, speed_caps, straight_jerk, tighten
+from cnc_shape.kernels.jerk_certificate import certificate
+from cnc_shape.kernels.jerk_phases import moved
+from cnc_shape.kernels.jerk_pieces import NEAR, cut, index_pieces, more_room, spliced
+from cnc_shape.kernels.jerk_rounding import round_off
+from cnc_shape.kernels.jerk_scan import PHASES, envelope, mirrored, scan
+
+NO_ACCELERATION = 1e-9  # s, times the jerk: as good as none
+SAME_SPEED = 1e-10  # -
+
+
+@kernel
+def window_law(
+    size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, begin,
+    start, finish,
+):  # fmt: skip
+    """Pieces of the law of some cells, without acceleration at both ends; no pieces if there is none.
+
+    Parameters
+    ----------
+    begin
+        Number of the first of the cells, from which they are counted in the output.
+    start, finish
+        Speeds at both ends.
+    """
+    count = size.size
+    own_cap = cap.copy()
+    own_cap[0] = start
+    own_cap[count] = finish
+    rising = np.empty((PHASES * count, 5))
+    falling = np.empty((PHASES * count, 5))
+    rising_cell = np.empty(PHASES * count, np.int64)
+    falling_cell = np.empty(PHASES * count, np.int64)
+    nodes = np.zeros(count + 1)
+    for k in range(count):
+        nodes[k + 1] = nodes[k] + size[k]
+    r = scan(
+        size, top, own_cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, rising,
+        rising_cell,
+    )  # fmt: skip
+    f = scan(
+        size[::-1].copy(), top[::-1].copy(), own_cap[::-1].copy(), straight_a[::-1].copy(),
+        straight_b[::-1].copy(), -first[::-1, ::-1].copy(), bend[::-1, ::-1].copy(), -third[::-1].copy(),
+        acceleration, jerk, ease[::-1].copy(), falling, falling_cell,
+    )  # fmt: skip
+    mirrored(falling, falling_cell, f, size)
+    upper = np.empty((r + f + count, 5))
+    upper_cell = np.empty(r + f + count, np.int64)
+    u = envelope(rising, rising_cell, r, falling, falling_cell, f, size, upper, upper_cell)
+    least = np.empty(count)
+    falling_jerk(first, third, straight_a, straight_b, jerk, ease, upper, upper_cell, u, least)
+    law = np.empty((2 * u + 4, 5))
+    law_cell = np.empty(2 * u + 4, np.int64)
+    w = round_off(upper, upper_cell, u, nodes, least, law, law_cell)
+    pieces = np.empty((w + count + 1, 6))
+    cell = np.empty(w + count + 1, np.int64)
+    if w == 0:
+        return pieces[:0], cell[:0]
+    last = law[w - 1]
+    t = last[0]
+    off = (nodes[law_cell[w - 1]] + last[1] + moved(last[2], last[3], last[4], t)) - nodes[count]
+    slow = max(abs(law[0, 2] - start), abs(last[2] + t * (last[3] + t * last[4] / 2.0) - finish))
+    turned = max(abs(law[0, 3]), abs(last[3] + last[4] * t))
+    steepest = max(abs(law[0, 4]), max(abs(last[4]), least[count - 1]))
+    if abs(off) > NEAR or slow > SAME_SPEED * (1.0 + finish) or turned > NO_ACCELERATION * steepest:
+        return pieces[:0], cell[:0]
+    m = cut(law, law_cell, w, nodes, begin, pieces, cell)
+    return pieces[:m], cell[:m]
+
+
+@kernel
+def joint_speed(pieces, first_piece, cap, node, cells):
+    """Speed at a node where the law may be joined; -1 where it may not."""
+    if node == 0 or node == cells:
+        return 0.0
+    before = first_piece[node] - 1
+    after = first_piece[node]
+    if pieces[before, 4] != 0.0 or pieces[before, 5] != 0.0:
+        return -1.0
+    if pieces[after, 4] != 0.0 or pieces[after, 5] != 0.0 or pieces[after, 3] != pieces[before, 3]:
+        return -1.0
+    return pieces[after, 3] if pieces[after, 3] <= cap[node] else -1.0
+
+
+@kernel
+def joint_before(pieces, first_piece, cap, node, cells):
+    """The nearest node at or before `node` where the law may be joined, and its speed there."""
+    while True:
+        speed = joint_speed(pieces, first_piece, cap, node, cells)
+        if speed >= 0.0:
+            return node, speed
+        node -= 1
+
+
+@kernel
+def joint_after(pieces, first_piece, cap, node, cells):
+    """The nearest node at or after `node` where the law may be joined, and its speed there."""
+    while True:
+        speed = joint_speed(pieces, first_piece, cap, node, cells)
+        if speed >= 0.0:
+            return node, speed
+        node += 1
+
+
+@kernel
+def section_law(
+    rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, tolerances,
+    most_rounds,
+):  # fmt: skip
+    """Time law of the cells `begin` to `end`, from rest to rest.
+
+    Parameters
+    ----------
+    tolerances (3,)
+        By which velocity and feed, acceleration and jerk may exceed their limits.
+    most_rounds
+        Of lowering limits where they do not.
+
+    Returns
+    -------
+    pieces (m,6), cell (m,)
+        0, duration, place in the cell, v, a, b; the cell counted from `begin`.
+    work
+        Cells planned, over all rounds.
+    found
+        Cells that still ask for too much.
+    """
+    count = end - begin
+    d = acceleration.size
+    size = length[begin:end].copy()
+    first = np.empty((count, 2, d))
+    bend = np.empty((count, 2, d))
+    third = np.empty((count, d))
+    derivatives(rows[begin:end], size, first, bend, third)
+    straight_a = np.empty(count)
+    straight_b = np.empty(count)
+    limits = limit_v2[begin:end]
+    straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
+    ease = np.ones((count, 5))
+    lower = np.ones((count, 5))
+    changed = np.zeros(count, np.int64)
+    worst = np.empty((count, 7))
+    top = np.empty(count)
+    cap = np.empty(count + 1)
+    speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, 0, count, top, cap)
+    pieces, cell = window_law(
+        size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, 0, 0.0, 0.0
+    )
+    work = count
+    if cell.size == 0:
+        return pieces, cell, work, count
+    certificate(
+        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
+        tolerances, worst,
+    )  # fmt: skip
+    found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
+    first_piece = np.zeros(count + 1, np.int64)
+    new = np.empty((count + 64, 6))
+    new_cell = np.empty(count + 64, np.int64)
+    windows = np.empty((count + 1, 4), np.int64)  # first cell, end, first new piece, end
+    starts = np.empty(count + 1)
+    rounds = 1
+    while found > 0 and rounds < most_rounds:
+        rounds += 1
+        index_pieces(cell, cell.size, first_piece, count)
+        k = 0
+        while k < count:
+            until = k
+            while until < count and changed[until] == 1:
+                until += 1
+            if until > k:
+                speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, k, until, top, cap)
+            k = until + 1
+        made = 0
+        filled = 0
+        k = 0
+        while k < count:
+            if changed[k] == 0:
+                k += 1
+                continue
+            high = k
+            while high < count and changed[high] == 1:
+                high += 1
+            low, start = joint_before(pieces, first_piece, cap, k, count)
+            high, finish = joint_after(pieces, first_piece, cap, high, count)
+            while True:
+                while made > 0 and low < windows[made - 1, 1]:
+                    made -= 1
+                    filled = windows[made, 2]
+                    low = min(low, windows[made, 0])
+                    start = starts[made] if low == windows[made, 0] else start
+                work += high - low
+                part, part_cell = window_law(
+                    size[low:high], top[low:high], cap[low : high + 1], straight_a[low:high],
+                    straight_b[low:high], first[low:high], bend[low:high], third[low:high], acceleration,
+                    jerk, ease[low:high], low, start, finish,
+                )  # fmt: skip
+                if part_cell.size > 0:
+                    break
+                if low == 0 and high == count:
+                    return pieces[:0], cell[:0], work, count
+                grown = high - low
+                low, start = joint_before(pieces, first_piece, cap, max(low - grown, 0), count)
+                high, finish = joint_after(pieces, first_piece, cap, min(high + grown, count), count)
+            if filled + part_cell.size > new_cell.size:
+                new, new_cell = more_room(new, new_cell, part_cell.size)
+            for m in range(part_cell.size):
+                for column in range(6):
+                    new[filled + m, column] = part[m, column]
+                new_cell[filled + m] = part_cell[m]
+            starts[made] = start
+            windows[made, 0] = low
+            windows[made, 1] = high
+            windows[made, 2] = filled
+            filled += part_cell.size
+            windows[made, 3] = filled
+            made += 1
+            k = high
+        pieces, cell = spliced(pieces, cell, first_piece, windows, made, new, new_cell)
+        index_pieces(cell, cell.size, first_piece, count)
+        changed[:] = 0
+        found = 0
+        for n in range(made):
+            low = windows[n, 0]
+            high = windows[n, 1]
+            certificate(
+                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
+                alone, velocity, acceleration, jerk, tolerances, worst,
+            )  # fmt: skip
+            found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
+    return pieces, cell, work, found
+
+
+@kernel
+def path_law(
+    rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, tolerances,
+    most_rounds,
+):  # fmt: skip
+    """Time law of a whole path, section by section.
+
+    Returns
+    -------
+    pieces (m,6), cell (m,)
+        0, duration, place in the cell, v, a, b.
+    stuck
+        A cell in a section without a law; -1 if there is none.
+    """
+    count = length.size
+    out = np.empty((4 * count + 64, 6))
+    out_cell = np.empty(4 * count + 64, np.int64)
+    filled = 0
+    stuck = -1
+    begin = 0
+    while begin < count:
+        if dwell[begin] > 0.0 or length[begin] == 0.0:
+            if filled == out_cell.size:
+                out, out_cell = more_room(out, out_cell, 1)
+            out[filled] = 0.0
+            out[filled, 1] = dwell[begin]
+            out_cell[filled] = begin
+            filled += 1
+        end = begin + 1
+        if length[begin] > 0.0:
+            while end < count and not stop[end] and length[end] > 0.0:
+                end += 1
+            pieces, cell, _, found = section_law(
+                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end,
+                tolerances, most_rounds,
+            )  # fmt: skip
+            if found > 0 and stuck < 0:
+                stuck = begin
+            if filled + cell.size > out_cell.size:
+                out, out_cell = more_room(out, out_cell, cell.size)
+            for n in range(cell.size):
+                for column in range(6):
+                    out[filled + n, column] = pieces[n, column]
+                out_cell[filled + n] = begin + cell[n]
+            filled += cell.size
+        begin = end
+    return out[:filled], out_cell[:filled], stuck
