@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.measuring import Kind, Row, best_of, child, report, workshop
 from benchmarks.motions import LIMITS, path
 from cnc_shape.arrays import frozen, frozen_integers
-from cnc_shape.feedrate import plan
+from cnc_shape.planning import plan
 from cnc_shape.smoothing import Path as SmoothPath
 
 CELLS = 200_000

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from benchmarks import programs
 from benchmarks.measuring import workshop
-from cnc_shape.feedrate import Profile, plan
+from cnc_shape.feedrate import Profile
 from cnc_shape.limits import Limits
+from cnc_shape.planning import plan
 from cnc_shape.readers import read_program
 from cnc_shape.smoothing import Path as SmoothPath
 from cnc_shape.smoothing import Smoothing, smooth

@@ -18,10 +18,10 @@ from cnc_shape.arrays import frozen
 from cnc_shape.contour import contour_error
 from cnc_shape.controllers import Control, CrossCoupling, Estimator, Feedforward
 from cnc_shape.controllers.loop import Command, Poses
-from cnc_shape.feedrate import plan
 from cnc_shape.joints import Joints, joints_of
 from cnc_shape.kinematics import cubic_parallel, cubic_rails
 from cnc_shape.machine import Axis, FirstOrderLag, Machine
+from cnc_shape.planning import plan
 from cnc_shape.plant import discretise
 from cnc_shape.readers import read_program
 from cnc_shape.segments import path_table, segments

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from cnc_shape.config.machine_file import load_machine
     from cnc_shape.contour import contour_error
     from cnc_shape.controllers import Control, CrossCoupling, Feedforward
-    from cnc_shape.feedrate import plan
     from cnc_shape.modes import Mode
+    from cnc_shape.planning import plan
     from cnc_shape.readers import read_program
     from cnc_shape.shapers.command_shaping import shape_command
     from cnc_shape.shapers.shaping import shape
@@ -48,7 +48,7 @@ _HOMES = {
     "contour_error": "contour",
     "foot_windows": "windows",
     "load_machine": "config.machine_file",
-    "plan": "feedrate",
+    "plan": "planning",
     "plot": "api",
     "read_program": "readers",
     "sample": "trajectory",

@@ -1,4 +1,4 @@
-"""Profile: the time law along a path, as fast as the axes and the feed allow.
+"""Profile: the time law along a path, as fast as the axes and the feed allow, without a limit of the jerk.
 
 The scan backwards finds how fast each node may be passed at most if all that follows is to be kept, the
 scan forwards drives up to that (`kernels/time_law.py`). A chunk is planned as if the path rested at its
@@ -17,8 +17,7 @@ import numpy as np
 
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.kernels.path_limits import chord_speeds, path_excesses, straight_along
-from cnc_shape.kernels.sampling import excesses
+from cnc_shape.kernels.path_limits import chord_speeds, straight_along
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.kernels.time_law import backward, forward
 from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
@@ -54,27 +53,8 @@ class Profile:
         return float(self.time[-1] + self.duration[-1]) if len(self) else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Violation:
-    """What a time law asks of the machine beyond its limits; 0 or less where the promise is kept."""
-
-    velocity: float  # -, largest relative excess over an axis's velocity
-    acceleration: float  # -, the same for acceleration
-    feed: float  # -, the same for the feed rate
-    gap: float  # mm or rad, largest jump of the path parameter between pieces
-    jump: float  # mm/s or rad/s, largest jump of the path speed between pieces
-    line: int | None  # source line of the largest excess
-    path_acceleration: float = -1.0  # -, the same for the acceleration along the path
-    chord: float = -1.0  # -, the same for the speed at which chords keep their error
-
-    @property
-    def worst(self) -> float:
-        """Largest relative excess over any limit."""
-        return max(self.velocity, self.acceleration, self.feed, self.path_acceleration, self.chord)
-
-
 @dataclass(frozen=True, eq=False, slots=True)
-class PlanningState:
+class ScanState:
     """Between two chunks: cells whose speed depends on what follows, and the motion at their start."""
 
     parts: tuple[Path, ...]
@@ -84,12 +64,12 @@ class PlanningState:
     passed: int  # cells of the program before the first one
 
 
-PlanningStep: TypeAlias = Callable[[PlanningState | None, Path, bool], tuple[PlanningState | None, Profile]]
+ScanStep: TypeAlias = Callable[[ScanState | None, Path, bool], tuple[ScanState | None, Profile]]
 
 
-def planning(
+def scanning(
     limits: Sequence[Limits], gentleness: FloatArray | None = None, path_limits: PathLimits = NO_PATH_LIMITS
-) -> PlanningStep:
+) -> ScanStep:
     """Return the resumable step from Path to Profile: ``step(state, chunk, last) -> (state, profile)``.
 
     Parameters
@@ -104,16 +84,16 @@ def planning(
     velocity = frozen([limit.velocity for limit in limits])
     acceleration = frozen([limit.acceleration for limit in limits])
 
-    def step(state: PlanningState | None, path: Path, last: bool) -> tuple[PlanningState | None, Profile]:
+    def step(state: ScanState | None, path: Path, last: bool) -> tuple[ScanState | None, Profile]:
         check_executable(path, (("velocity", velocity), ("acceleration", acceleration)))
-        before = state or PlanningState((), frozen(np.zeros(3)), np.inf, PATIENCE, 0)
+        before = state or ScanState((), frozen(np.zeros(3)), np.inf, PATIENCE, 0)
         parts = (*before.parts, path) if len(path) else before.parts
         gathered = sum(len(part) for part in parts)
         if gathered == 0 or (not last and gathered < before.patience):
             waiting = None if last else replace(before, parts=parts)
             return waiting, _no_pieces(path.cut(slice(0, 0)))
         whole = join_paths(parts)
-        asked, feed_rate = _gentle(whole, _feed_rate(whole, path_limits), gentleness, before.passed)
+        asked, feed_rate = gentle(whole, chord_feed_rate(whole, path_limits), gentleness, before.passed)
         limit_v2, straight = speed_limits(
             asked, whole.length, feed_rate, rotary_only(whole), velocity, acceleration
         )
@@ -149,13 +129,13 @@ def planning(
         rest = whole.cut(slice(final, None))
         limit_before = float(limit_v2[final - 1, 1]) if final else before.before_v2
         patience, passed = 2 * len(rest) + PATIENCE, before.passed + final
-        return PlanningState((rest,), frozen(clock), limit_before, patience, passed), profile
+        return ScanState((rest,), frozen(clock), limit_before, patience, passed), profile
 
     return step
 
 
-def plan(path: Path, limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS) -> Profile:
-    """Plan the fastest motion along a whole path.
+def scan_path(path: Path, limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS) -> Profile:
+    """Plan the fastest motion along a whole path whose axes have no jerk limit.
 
     Every axis keeps its velocity and acceleration, ``|q'| du/dt`` in XYZ the feed rate (of the rotary axes
     where they move alone) and the `path_limits`.
@@ -165,7 +145,7 @@ def plan(path: Path, limits: Sequence[Limits], path_limits: PathLimits = NO_PATH
     InfeasibleError
         A move of an axis without velocity or acceleration, or without feed; names the line.
     """
-    _, profile = planning(limits, None, path_limits)(None, path, True)
+    _, profile = scanning(limits, None, path_limits)(None, path, True)
     return profile
 
 
@@ -174,37 +154,7 @@ def rotary_only(path: Path) -> IntArray:
     return frozen_integers(path.stretch == 0.0)
 
 
-def worst_violation(
-    profile: Profile, limits: Sequence[Limits], points: int = 9, path_limits: PathLimits = NO_PATH_LIMITS
-) -> Violation:
-    """Evaluate a time law densely against the limits it promises to keep, and its pieces for gaps.
-
-    Parameters
-    ----------
-    points
-        Points in each piece, both ends included. Acceleration is quadratic in the path parameter there.
-    """
-    path = profile.path
-    bounds = np.array([[limit.velocity for limit in limits], [limit.acceleration for limit in limits]])
-    worst, where = excesses(
-        profile.time, profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk,
-        profile.cell, path.coefficients, path.length, path.feed_rate, rotary_only(path), path.stop, bounds,
-        points,
-    )  # fmt: skip
-    ratios, places = worst[:3], where[:3]
-    if path_limits != NO_PATH_LIMITS:
-        more, more_places = path_excesses(
-            profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk, profile.cell,
-            path.coefficients, rotary_only(path), float(path_limits.acceleration),
-            *(path_limits.chord or (0.0, 0.0)), points,
-        )  # fmt: skip
-        ratios, places = np.append(ratios, more), np.append(places, more_places)
-    line = int(path.line[profile.cell[places[int(np.argmax(ratios))]]]) if len(profile) else None
-    velocity, acceleration, feed, *along = (float(ratio) - 1.0 for ratio in ratios)
-    return Violation(velocity, acceleration, feed, float(worst[3]), float(worst[4]), line, *along)
-
-
-def _feed_rate(path: Path, path_limits: PathLimits) -> FloatArray:
+def chord_feed_rate(path: Path, path_limits: PathLimits) -> FloatArray:
     """Feed rate of each cell, (k,) mm/s, at which chords keep their error on its tightest curve."""
     if path_limits.chord is None:
         return path.feed_rate
@@ -220,7 +170,7 @@ def _along(path: Path, path_limits: PathLimits) -> FloatArray:
     return frozen(np.where(path.stretch == 0.0, np.inf, path_limits.acceleration))
 
 
-def _gentle(
+def gentle(
     path: Path, feed_rate: FloatArray, gentleness: FloatArray | None, passed: int
 ) -> tuple[FloatArray, FloatArray]:
     """What the scans plan for: a path whose derivatives, and whose accelerations with them, are larger.

@@ -18,11 +18,11 @@ from cnc_shape.applying import Application
 from cnc_shape.arrays import FloatArray, IntArray, frozen
 from cnc_shape.cases import default_cases, timings
 from cnc_shape.census import count
+from cnc_shape.certificate import worst_violation
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Setup
 from cnc_shape.disturbances import Disturbances, LoadTorque, PathDirection, Steps
-from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.kernels import compiled_count
 from cnc_shape.kernels.noise import normal
 from cnc_shape.kinematics import cubic_parallel, cubic_rails, first_refusal, linear_delta, trunnion_ac
@@ -30,6 +30,7 @@ from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
 from cnc_shape.loading import loading
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import run
+from cnc_shape.planning import plan
 from cnc_shape.readers import ReadingOptions, read_program, reading
 from cnc_shape.readers.source import COMPILED_FROM
 from cnc_shape.recording.extremes import BUCKETS
@@ -93,7 +94,8 @@ def warm() -> Iterator[int]:
                     yield compiled_count()
                     _apply(path, setup, options)
                     yield compiled_count()
-        _certify(Path(folder) / "lines.nc", machines[0])
+        for name in ("lines.nc", "curves.nc"):
+            _certify(Path(folder) / name, machines[0])
         _thin(Path(folder) / "long.nc", machines[0])
         _stream(machines[0])
         _hold()
@@ -168,5 +170,7 @@ def _certify(path: Path, setup: Setup) -> None:
     program = read_program(path)
     limits = [axis.limits for axis in setup.machine.with_axes(program.axes).axes]
     curve = smooth(build_toolpath(program), Smoothing(setup.planning.path_tolerance))
-    for path_limits in (NO_PATH_LIMITS, PathLimits(500.0, 1e-3, 1e-3)):
-        worst_violation(plan(curve, limits, path_limits), limits, path_limits=path_limits)
+    gentle = [replace(limit, jerk=50.0 * limit.acceleration) for limit in limits]
+    for wanted in (limits, gentle):
+        for path_limits in (NO_PATH_LIMITS, PathLimits(500.0, 1e-3, 1e-3)):
+            worst_violation(plan(curve, wanted, path_limits), wanted, path_limits=path_limits)

@@ -8,8 +8,9 @@ import numpy as np
 from paths import rows
 
 from cnc_shape.arrays import frozen, frozen_integers
-from cnc_shape.feedrate import Profile, planning
+from cnc_shape.feedrate import Profile
 from cnc_shape.limits import Limits
+from cnc_shape.planning import planning
 from cnc_shape.program import Motion, PathMode, Program
 from cnc_shape.smoothing import Path, Smoothing, smoothing
 from cnc_shape.toolpath import Toolpath, build_toolpath

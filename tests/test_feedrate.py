@@ -13,11 +13,13 @@ from paths import arc, dwell, line, toolpath
 from scipy.interpolate import CubicSpline
 
 from cnc_shape.arrays import frozen, frozen_integers
+from cnc_shape.certificate import worst_violation
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.feedrate import Profile, plan, planning, rotary_only, worst_violation
+from cnc_shape.feedrate import Profile, rotary_only
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.kernels.time_law import backward
 from cnc_shape.limits import Limits
+from cnc_shape.planning import plan, planning
 from cnc_shape.program import PathMode
 from cnc_shape.smoothing import Path, Smoothing, join_paths, smooth
 

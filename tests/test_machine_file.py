@@ -156,13 +156,11 @@ def test_a_shaper_of_type_none_is_no_shaper() -> None:
     assert parse(with_axis("shaper: {type: none}")).shapers == {}
 
 
-def test_jerk_limits_warn_once_that_they_do_not_limit_yet() -> None:
+def test_a_jerk_limit_is_the_axis_s() -> None:
     limits = "limits: {velocity_mm_s: 1, acceleration_mm_s2: 1, jerk_mm_s3: 5}"
     setup = parse(f"axes:\n  x: {{{limits}}}\n  y: {{{limits}}}\n")
     assert setup.machine.axes[1].limits.jerk == 5.0
-    assert setup.warnings == (
-        "machine.yaml:2: warning: jerk limits are read, but do not limit the motion yet",
-    )
+    assert setup.warnings == ()
 
 
 @pytest.mark.parametrize(

@@ -13,12 +13,14 @@ from paths import arc, line, toolpath
 from test_feedrate import assert_keeps, spline_path
 
 from cnc_shape.arrays import frozen, frozen_integers
+from cnc_shape.certificate import worst_violation
 from cnc_shape.errors import OptionError
-from cnc_shape.feedrate import plan, planning, rotary_only, worst_violation
+from cnc_shape.feedrate import rotary_only
 from cnc_shape.kernels.path_limits import chord_speeds
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.kernels.time_law import backward
 from cnc_shape.limits import Limits, PathLimits
+from cnc_shape.planning import plan, planning
 from cnc_shape.program import PathMode
 from cnc_shape.smoothing import Smoothing, join_paths, smooth
 from cnc_shape.trajectory import sample

@@ -10,12 +10,12 @@ from paths import arc, dwell, line, program
 from test_pipeline import cut
 
 from cnc_shape.arrays import frozen
-from cnc_shape.feedrate import plan
 from cnc_shape.kernels.progress import along_path
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.modes import Mode
 from cnc_shape.motion import moving
+from cnc_shape.planning import plan
 from cnc_shape.program import PathMode
 from cnc_shape.shapers import make_shaper, zv, zvd
 from cnc_shape.shapers.path_shaping import common_shaper, path_sampling

@@ -13,18 +13,19 @@ from paths import arc, line, program
 
 from cnc_shape.api import simulate_program
 from cnc_shape.cases import default_cases, pick_cases, timings
+from cnc_shape.certificate import worst_violation
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Planning, Shaping
 from cnc_shape.controllers.compensation import DisturbanceObserver, InertiaCompensation
 from cnc_shape.disturbances import UNDISTURBED, Disturbances, LoadTorque, PathDirection, SineBurst
 from cnc_shape.errors import InfeasibleError, OptionError
-from cnc_shape.feedrate import plan, worst_violation
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine, ServoMotor
 from cnc_shape.motion import moving, replaying
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import Case, run
+from cnc_shape.planning import plan
 from cnc_shape.readers import ReadingOptions, read_program, read_trajectory
 from cnc_shape.recording import MOTORS, Signals
 from cnc_shape.report.table import summary_json

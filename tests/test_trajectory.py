@@ -7,7 +7,7 @@ from motions import MILL, PRINTER, lines, wander
 from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, toolpath
 
-from cnc_shape.feedrate import plan
+from cnc_shape.planning import plan
 from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.trajectory import sample, sampling
 

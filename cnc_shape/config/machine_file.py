@@ -11,7 +11,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from cnc_shape.config.bundled import bundled
-from cnc_shape.config.complaints import complaint, key_place, locate, refuse_at
+from cnc_shape.config.complaints import complaint, locate, refuse_at
 from cnc_shape.config.control import read_control
 from cnc_shape.config.disturbances import read_disturbances
 from cnc_shape.config.drives import Drives, check_ticks, drive_of
@@ -106,7 +106,6 @@ def read_machine(data: bytes, source: str) -> tuple[Setup, tuple[Note, ...], Tre
     shapers = {name: _shaper(source, tree, machine.axis(name), c) for name, c in choices.items()}
     acting = {} if planning.shaping is Shaping.NONE else shapers
     notes = (
-        *_jerk_note(tree, axes),
         *_single_mode_notes(tree, machine, choices),
         *position_notes(tree, machine, acting, choices),
     )
@@ -258,18 +257,6 @@ def _tools(source: str, tree: Tree, model: MachineModel) -> tuple[Tool, ...]:
             refuse(source, place, reason, "give every tool a number of its own")
         tools[tool.number] = Tool(tool.number, tool.length_mm, tool.diameter_mm)
     return tuple(tools.values())
-
-
-def _jerk_note(tree: Tree, axes: AxisModels) -> tuple[Note, ...]:
-    """One warning, at the first jerk limit of the file."""
-    lines: list[int] = []
-    for name in axes:
-        for key in ("jerk_mm_s3", "jerk_deg_s3"):
-            _, path = locate(tree, ("axes", name, "limits", key))
-            if path[-1] == key:
-                lines.append(key_place(tree, path).line)
-    message = "jerk limits are read, but do not limit the motion yet"
-    return (Note(min(lines), message),) if lines else ()
 
 
 def _single_mode_notes(tree: Tree, machine: Machine, choices: Mapping[str, ShaperChoice]) -> tuple[Note, ...]:

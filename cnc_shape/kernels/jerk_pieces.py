@@ -11,16 +11,21 @@ NEAR = 1e-10  # mm or rad, of a node: as good as there
 
 
 @kernel
-def timed(pieces):
-    """Sum up the durations of pieces (m,6) to their times, with what rounding took away."""
-    time = 0.0
-    lost = 0.0
+def timed(pieces, clock):
+    """Sum up the durations of pieces (m,6) to their times, from `clock` (2,) on, and move that forward.
+
+    `clock` holds the time and its rounding error.
+    """
+    time = clock[0]
+    lost = clock[1]
     for m in range(pieces.shape[0]):
         pieces[m, 0] = time
         step = pieces[m, 1] - lost
         following = time + step
         lost = (following - time) - step
         time = following
+    clock[0] = time
+    clock[1] = lost
 
 
 @kernel
