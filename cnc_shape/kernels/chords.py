@@ -121,8 +121,9 @@ def merge(start, end, tolerance, merge_tolerance, noise_tolerance, feed_rate, st
     distance = np.empty(m)
     n = 0
     k = 0
+    run = 0  # the edge after those that may merge with k, as far as it matters
     while k < m:
-        run = k + 1  # the edge after those that may merge with k, as far as it matters
+        run = max(run, k + 1)
         if whole[k] == 1:
             while (
                 run < m
