@@ -14,7 +14,6 @@ from typing import TypeAlias
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import Profile, check_executable, chord_feed_rate, gentle, rotary_only
 from cnc_shape.kernels.jerk_pieces import timed
 from cnc_shape.kernels.jerk_windows import windows_law
@@ -77,13 +76,11 @@ def jerk_planning(
         alone, clock = rotary_only(whole), before.clock.copy()
         marks, speeds, counts = before.marks.copy(), before.speeds.copy(), before.counts.copy()
         limit_v2, straight = speed_limits(asked, whole.length, feed_rate, alone, velocity, acceleration)
-        pieces, cell, held, held_cell, final, stuck = windows_law(
+        pieces, cell, held, held_cell, final = windows_law(
             asked, whole.length, whole.stop, whole.dwell, feed_rate, alone, limit_v2, straight, velocity,
             acceleration, jerk, TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD, before.held.copy(),
             before.held_cell.copy(), marks, speeds, counts,
         )  # fmt: skip
-        if stuck >= 0:
-            raise InfeasibleError("no time law keeps the jerk limit here", line=int(whole.line[stuck]))
         timed(pieces, clock)
         profile = _profile(whole.cut(slice(0, final)), pieces, cell)
         if last:

@@ -17,11 +17,13 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_law import NO_ACCELERATION, section_law
 from cnc_shape.kernels.jerk_pieces import index_pieces, more_room
+from cnc_shape.kernels.jerk_rescue import slow_law
 
 SAME_CAP = 1e-9  # -, of a speed that is the node's own cap
 CALM_AHEAD = 1.5  # stopping distances between a node where the law is kept at one speed and the window's end
 CALM_SHARE = 0.999  # -, of the lowest speed about such a node
 CALM_TRIES = 3
+FEW = 16  # cells that are not divided any further where they have no law
 PLANNED, CALMED, MERGED, RESTS, SLOWED = 0, 1, 2, 3, 4  # columns of what is counted
 
 
@@ -138,6 +140,17 @@ def released(pieces, cell, until, at, out, out_cell, filled):
 
 
 @kernel
+def waited(duration, at, out, out_cell, filled):
+    """Append a rest at the start of the cell `at`; returns the arrays and how many pieces they hold."""
+    if filled == out_cell.size:
+        out, out_cell = more_room(out, out_cell, 1)
+    out[filled] = 0.0
+    out[filled, 1] = duration
+    out_cell[filled] = at
+    return out, out_cell, filled + 1
+
+
+@kernel
 def windows_law(
     rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, tolerances,
     most_rounds, last, window, ahead, held, held_cell, marks, speeds, counts,
@@ -163,24 +176,17 @@ def windows_law(
         What is held back now.
     done
         The first cell that is not final.
-    stuck
-        A cell in a section without a law; -1 if there is none.
     """
     count = length.size
     out = np.empty((4 * count + 64, 6))
     out_cell = np.empty(4 * count + 64, np.int64)
     filled = 0
-    stuck = -1
     at = 0
+    most = count
     while at < count:
         begin = at + marks[0]
         if marks[0] == 0 and length[at] == 0.0:
-            if filled == out_cell.size:
-                out, out_cell = more_room(out, out_cell, 1)
-            out[filled] = 0.0
-            out[filled, 1] = dwell[at]
-            out_cell[filled] = at
-            filled += 1
+            out, out_cell, filled = waited(dwell[at], at, out, out_cell, filled)
             at += 1
             continue
         end, complete, rests = window_end(
@@ -188,13 +194,9 @@ def windows_law(
         )
         if not complete:
             break
-        if marks[0] == 0 and dwell[at] > 0.0:
-            if filled == out_cell.size:
-                out, out_cell = more_room(out, out_cell, 1)
-            out[filled] = 0.0
-            out[filled, 1] = dwell[at]
-            out_cell[filled] = at
-            filled += 1
+        if end - begin > most:
+            end = begin + most
+            rests = True
         entry = speeds[1] if marks[0] > 0 else 0.0
         pieces, cell, cap, work, found = section_law(
             rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, entry,
@@ -218,10 +220,22 @@ def windows_law(
                 at += marks[1]
                 marks[0] = 0
                 continue
-        elif found > 0 and stuck < 0:
-            stuck = at
+        elif found > 0 and end - at > FEW:
+            most = (end - at) // 2
+            counts[RESTS] += 1
+            continue
+        elif found > 0:
+            pieces, cell = slow_law(
+                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, at, end,
+                tolerances,
+            )  # fmt: skip
+            counts[SLOWED] += end - at
+            rests = True
+        if marks[0] == 0 and dwell[at] > 0.0:
+            out, out_cell, filled = waited(dwell[at], at, out, out_cell, filled)
+        most = count
         marks[0] = 0
-        if rests or found > 0:
+        if rests:
             out, out_cell, filled = released(pieces, cell, end - at, at, out, out_cell, filled)
             at = end
             continue
@@ -258,4 +272,4 @@ def windows_law(
         marks[1] = end - at
         speeds[0] = entry
         speeds[1] = speed
-    return out[:filled], out_cell[:filled], held, held_cell, at, stuck
+    return out[:filled], out_cell[:filled], held, held_cell, at
