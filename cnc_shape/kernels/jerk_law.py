@@ -90,13 +90,17 @@ def joint_speed(pieces, first_piece, cap, node, cells, start):
         return start
     if node == cells:
         return 0.0
-    before = first_piece[node] - 1
-    after = first_piece[node]
-    if pieces[before, 4] != 0.0 or pieces[before, 5] != 0.0:
+    m = first_piece[node] - 1
+    v = pieces[m + 1, 3]
+    if pieces[m + 1, 4] != 0.0 or v > cap[node]:
         return -1.0
-    if pieces[after, 4] != 0.0 or pieces[after, 5] != 0.0 or pieces[after, 3] != pieces[before, 3]:
+    t = pieces[m, 1]
+    steepest = max(abs(pieces[m, 5]), abs(pieces[m + 1, 5]))
+    if abs(pieces[m, 4] + t * pieces[m, 5]) > NO_ACCELERATION * steepest:
         return -1.0
-    return pieces[after, 3] if pieces[after, 3] <= cap[node] else -1.0
+    if abs(pieces[m, 3] + t * (pieces[m, 4] + t * pieces[m, 5] / 2.0) - v) > SAME_SPEED * v:
+        return -1.0
+    return v
 
 
 @kernel
