@@ -24,7 +24,7 @@ from cnc_shape.program import Motion
 
 WORST_LINES = 5  # that are told
 AT_FEED = 0.99  # -, of the feed rate: as good as there
-SHORTEST_LOSS = 1e-9  # s: less is rounding
+DECIMALS = 9  # of a loss in s: the others are rounding
 KINDS = ((Motion.FEED, Motion.ARC), (Motion.RAPID,), (Motion.DWELL,))
 
 
@@ -180,8 +180,8 @@ def cycle_time(
         There is no stretch.
     """
     state: ClockState | None = None
-    for state, _ in clocked(stretches, machine, path_limits):
-        pass
+    for sums, _ in clocked(stretches, machine, path_limits):
+        state = sums
     if state is None:
         raise ValueError("no stretch was planned")
     return state.total()
@@ -222,12 +222,11 @@ def _by_line(parts: tuple[_Lines, ...], moves: Moves) -> tuple[_Lines, ...]:
 
 
 def _worst(parts: tuple[_Lines, ...]) -> tuple[LineTime, ...]:
-    """Lines that lose most; of equal ones the first."""
+    """Lines that lose most; of those that lose the same but for rounding the first."""
     found: list[LineTime] = []
     for part in parts:
-        order = np.argsort(part.naive_time - part.time, kind="stable")[:WORST_LINES]
-        found += [
-            LineTime(int(part.line[k]), float(part.time[k]), float(part.naive_time[k])) for k in order
-        ]
-    found.sort(key=lambda line: -line.lost)
-    return tuple(line for line in found[:WORST_LINES] if line.lost > SHORTEST_LOSS)
+        lost = np.round(part.time - part.naive_time, DECIMALS)
+        order = np.argsort(-lost, kind="stable")[:WORST_LINES]
+        found += [LineTime(int(part.line[k]), float(part.time[k]), float(part.naive_time[k])) for k in order]
+    found.sort(key=lambda line: -round(line.lost, DECIMALS))
+    return tuple(line for line in found[:WORST_LINES] if round(line.lost, DECIMALS) > 0.0)

@@ -22,7 +22,7 @@ from cnc_shape.toolpath import Toolpath
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Moves:
-    """A chunk of the moves of a toolpath in the order they are made: one row a move or dwell, waiting included.
+    """A chunk of the moves and dwells of a toolpath in the order they are made, one row each.
 
     A line of the program may have made several (a canned cycle), and come again (a loop).
     """
@@ -93,7 +93,8 @@ def passing(velocity: Sequence[float]) -> PassingStep:
         due, path, memory = _join(parts), profile.path, before.memory.copy()
         ends = passing_times(
             due.what, due.border, due.dwell, profile.time, profile.duration, profile.u, profile.velocity,
-            profile.acceleration, profile.jerk, profile.cell, path.stop, path.arc_length, path.stretch, memory,
+            profile.acceleration, profile.jerk, profile.cell, path.stop, path.arc_length, path.stretch,
+            memory,
         )  # fmt: skip
         if last:
             end = profile.end_time if len(profile) else before.clock
@@ -110,7 +111,7 @@ def passing(velocity: Sequence[float]) -> PassingStep:
 def naive_times(toolpath: Toolpath, velocity: FloatArray) -> FloatArray:
     """Time of every row as if speed could jump, (m,) s: length over feed rate; dwells as they are.
 
-    Rapids, and all else without a feed, run as fast as the axes' `velocity` (d,) lets them in a straight line.
+    Rapids, and all else without a feed, run straight as fast as the axes' `velocity` (d,) lets them.
     """
     change = np.abs(toolpath.end - toolpath.start)
     length, square = np.diff(toolpath.arc_length), np.zeros(len(toolpath))

@@ -37,10 +37,10 @@ def passing_times(
     """Times at which the ends of the first rows are passed, (n,) s, in their order.
 
     what (r,) TRAVEL, WAIT or ALONE; border (r,) mm, the end's place on the toolpath; dwell (r,) s; then the
-    pieces of a profile and the cells it runs through. `memory` (1,): the last cell was rotary axes alone; it is
-    updated in place.
+    pieces of a profile and the cells it runs through. `memory` (1,): the last cell was one of rotary axes
+    alone; it is updated in place.
 
-    Rest ends what came before it: travel up to its place, or the turn of a rotary axis. A dwell belongs to the
+    A stop ends what came before it: travel up to its place, or the turn of a rotary axis. Rest belongs to the
     waits that follow. Motion beyond a place passes whatever is still due there.
     """
     rows = what.size
@@ -92,9 +92,7 @@ def passing_times(
 
 
 @kernel
-def add_time_at_feed(
-    duration, u, speed, acceleration, jerk, cell, rows, feed_rate, alone, share, total
-):
+def add_time_at_feed(duration, u, speed, acceleration, jerk, cell, rows, feed_rate, alone, share, total):
     """Add to `total` (1,) s, in place, the time in which the speed is at least `share` of the feed rate."""
     for m in range(duration.size):
         k = cell[m]
