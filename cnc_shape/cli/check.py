@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Force, Json, PathStyle, Quiet
+from cnc_shape.cli.options import (
+    MACHINE_SUFFIXES,
+    BlockDelete,
+    Closed,
+    Dialect,
+    Force,
+    Json,
+    PathStyle,
+    Quiet,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,8 +27,6 @@ if TYPE_CHECKING:
     from cnc_shape.config.setup import Setup
     from cnc_shape.program import Program
     from cnc_shape.readers import Reading, ReadingOptions
-
-MACHINE_SUFFIXES = (".yaml", ".yml")
 
 
 def check(

@@ -8,6 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from cnc_shape.cli.options import MACHINE_SUFFIXES
 from cnc_shape.cli.output import warn
 from cnc_shape.cli.progress import line_by_line, progress
 from cnc_shape.config.setup import Setup
@@ -47,7 +48,7 @@ def check_times(files: list[str], times: str, *, force: bool) -> Path:
         The file cannot be made there.
     """
     target = Path(times)
-    if len(files) > 1:
+    if len(files) > 1 or Path(files[0]).suffix.lower() in MACHINE_SUFFIXES:
         raise OptionError("--times takes one program", hint="check one file at a time")
     if target.exists() and Path(files[0]).exists() and target.samefile(files[0]):
         raise OptionError(
