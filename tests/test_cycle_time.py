@@ -282,7 +282,7 @@ def test_time_at_feed_is_what_counting_finds(jerk):
 # --- real programs ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["lcnc_systems.ngc", "ugs_no_spaces.gcode", "lcnc_arcspiral.ngc"])
+@pytest.mark.parametrize("name", ["lcnc_lathe_pawn.ngc", "ugs_no_spaces.gcode", "lcnc_arcspiral.ngc"])
 def test_real_programs(shared, name):
     source = shared / "data" / "gcode" / "programs" / name
     want = json.loads(source.with_name(f"{name}.expected.json").read_text())

@@ -24,6 +24,7 @@ from cnc_shape.writers.moves import write_moves
 from cnc_shape.writers.publish import check_target
 
 KEPT, JERK_KEPT = 1e-6, 1e-3  # -, excess up to which a limit counts as kept
+ROUNDING = 1e-9  # -, excess that is not worth telling
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,5 +155,7 @@ def time_facts(time: dict[str, Any]) -> list[tuple[str, str]]:
 def _limits(violation: dict[str, float | None]) -> str:
     told = {name.replace("_", " "): excess for name, excess in violation.items() if excess is not None}
     kept = all(excess <= (JERK_KEPT if name == "jerk" else KEPT) for name, excess in told.items())
-    excesses = ", ".join(f"{name} {excess:.1g}" for name, excess in told.items())
+    excesses = ", ".join(
+        f"{name} {excess if excess > ROUNDING else 0.0:.1g}" for name, excess in told.items()
+    )
     return f"{'kept' if kept else 'exceeded'}, largest relative excess: {excesses}"
