@@ -15,6 +15,7 @@ import numpy as np
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.certificate import Violation, worst_violation
 from cnc_shape.feedrate import Profile, rotary_only
+from cnc_shape.jerk import jerk_limited
 from cnc_shape.kernels.passing import add_time_at_feed
 from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
 from cnc_shape.machine import Machine
@@ -23,6 +24,8 @@ from cnc_shape.passing import Moves, PassingState, passing
 from cnc_shape.program import Motion
 
 WORST_LINES = 5  # that are told
+POINTS = 9  # of a piece that are held against the limits
+POINTS_WITHOUT_JERK = 5  # the acceleration along an axis is quadratic there
 AT_FEED = 0.99  # -, of the feed rate: as good as there
 DECIMALS = 9  # of a loss in s: the others are rounding
 KINDS = ((Motion.FEED, Motion.ARC), (Motion.RAPID,), (Motion.DWELL,))
@@ -134,6 +137,7 @@ def clocking(limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS)
     path_limits
         Likewise.
     """
+    points = POINTS if jerk_limited(limits) else POINTS_WITHOUT_JERK
     passed = passing([limit.velocity for limit in limits])
 
     def step(state: ClockState | None, stretch: Planned) -> tuple[ClockState, Moves]:
@@ -141,7 +145,7 @@ def clocking(limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS)
         profile, excess = stretch.profile, now.excess
         rest, moves = passed(now.passing, stretch.toolpath, profile, stretch.last)
         if len(profile):
-            excess = excess.raised(worst_violation(profile, limits, path_limits=path_limits))
+            excess = excess.raised(worst_violation(profile, limits, points, path_limits))
         return ClockState(
             rest,
             _summed(now.sums, moves, profile),
