@@ -161,20 +161,20 @@ def test_a_rounded_corner_belongs_to_both_sides():
 # --- properties ---------------------------------------------------------------------------------------
 
 
-def part() -> Program:
-    """Arcs, short lines, corners, stops, waits, a rotary axis."""
+def part(times=1) -> Program:
+    """Arcs, short lines, corners, stops, waits, a rotary axis; over and over."""
     angle = np.linspace(0.0, 2.0, 60)[1:]
     wave = [line(40 + 10 * a, 3 * np.sin(3 * a), 0.0, 0.0, feed_rate=80.0) for a in angle]
     x = 40 + 10 * 2.0
     y = 3 * np.sin(6.0)
-    return program(
+    moves = [
         dwell(0.1), line(20.0, 0.0, 0.0, 0.0, feed_rate=60.0), line(20.0, 10.0, 0.0, 0.0, feed_rate=60.0),
         arc((40.0, 10.0, 0.0, 0.0), (30.0, 10.0, 0.0), -np.pi, feed_rate=40.0),
         line(40.0, 0.0, 0.0, 0.0, feed_rate=60.0, mode=STOP), dwell(0.05), dwell(0.2), *wave,
         line(x, y, 0.0, 1.0, feed_rate=1.0), line(x, y, 0.0, 2.0, feed_rate=1.0), dwell(0.3),
         {"motion": Motion.RAPID, "target": (0.0, 0.0, 0.0, 0.0)}, dwell(0.05),
-        axes=("x", "y", "z", "a"),
-    )  # fmt: skip
+    ]  # fmt: skip
+    return program(*(moves * times), axes=("x", "y", "z", "a"))
 
 
 @pytest.mark.parametrize("jerk", [np.inf, 20_000.0])
@@ -201,9 +201,9 @@ def test_the_cycle_time_is_that_of_the_simulation(jerk):
 
 
 @pytest.mark.parametrize("jerk", [np.inf, 20_000.0])
-@pytest.mark.parametrize("sizes", [(1,), (3, 0, 7), (50,)])
+@pytest.mark.parametrize("sizes", [(1,), (3, 0, 7), (500,)])
 def test_streamed_moves_are_the_same_bits(jerk, sizes):
-    of, whole = machine(jerk=jerk, rotary="a"), part()
+    of, whole = machine(jerk=jerk, rotary="a"), part(20)
     one, total = measured(whole, of)
     other, streamed = measured(cut(whole, sizes), of)
     for field in fields(Moves):
@@ -214,10 +214,10 @@ def test_streamed_moves_are_the_same_bits(jerk, sizes):
 def test_lines_that_come_again_are_one():
     """A loop: each of its two lines is told once, with all its time."""
     there, back = line(10.0, mode=STOP), line(0.0, mode=STOP)
-    whole = program(*([there, back] * 50))
-    whole = replace(whole, line=np.tile([7, 4], 50))
-    moves, total = measured(cut(whole, (9,)), machine())
-    assert len(moves) == 100
+    whole = program(*([there, back] * 2000))
+    whole = replace(whole, line=np.tile([7, 4], 2000))
+    moves, total = measured(cut(whole, (500,)), machine())
+    assert len(moves) == 4000
     assert [line.line for line in total.worst] == [4, 7]
     assert_allclose([line.time for line in total.worst], total.cycle_time / 2, rtol=1e-9)
 
