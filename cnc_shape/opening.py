@@ -54,15 +54,7 @@ class OpenMotion:
             told = [text.replace(machine, Path(machine).name, 1) for text in told]
             path = self.name
         told += [f"{path}:{note.line}: warning: {note.message}" for note in self.notes]
-        missing = lacking(self.setup.machine, self.moved)
-        if missing:
-            names = ", ".join(axis.upper() for axis in missing)
-            told.append(
-                f"warning: the machine lacks {names}, which the program moves: taken as ideal, "
-                f"{LINEAR_DEFAULT.velocity:g} mm/s, {LINEAR_DEFAULT.acceleration:g} mm/s² "
-                "(90 °/s, 900 °/s²), unlimited travel"
-            )
-        return told
+        return told + lacking_axes(self.setup.machine, self.moved)
 
     def unmet_loads(self) -> list[str]:
         """A warning for every load along an axis that the program leaves out, which is not simulated."""
@@ -72,6 +64,19 @@ class OpenMotion:
             for axis in dict.fromkeys(along)
             if axis not in self.axes
         ]
+
+
+def lacking_axes(machine: Machine, moved: Sequence[str]) -> list[str]:
+    """A warning, if a program moves axes that the machine does not describe."""
+    missing = lacking(machine, moved)
+    if not missing:
+        return []
+    names = ", ".join(axis.upper() for axis in missing)
+    return [
+        f"warning: the machine lacks {names}, which the program moves: taken as ideal, "
+        f"{LINEAR_DEFAULT.velocity:g} mm/s, {LINEAR_DEFAULT.acceleration:g} mm/s² "
+        "(90 °/s, 900 °/s²), unlimited travel"
+    ]
 
 
 @contextmanager

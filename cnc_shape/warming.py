@@ -22,12 +22,14 @@ from cnc_shape.certificate import worst_violation
 from cnc_shape.config.bundled import bundled
 from cnc_shape.config.machine_file import load_machine
 from cnc_shape.config.setup import Setup
+from cnc_shape.cycle_time import cycle_time
 from cnc_shape.disturbances import Disturbances, LoadTorque, PathDirection, Steps
 from cnc_shape.kernels import compiled_count
 from cnc_shape.kernels.noise import normal
 from cnc_shape.kinematics import cubic_parallel, cubic_rails, first_refusal, linear_delta, trunnion_ac
 from cnc_shape.limits import NO_PATH_LIMITS, PathLimits
 from cnc_shape.loading import loading
+from cnc_shape.motion import planned
 from cnc_shape.opening import open_motion
 from cnc_shape.pipeline import run
 from cnc_shape.planning import plan
@@ -96,6 +98,7 @@ def warm() -> Iterator[int]:
                     yield compiled_count()
         for name in ("lines.nc", "curves.nc"):
             _certify(Path(folder) / name, machines[0])
+            _clock(Path(folder) / name, machines[0])
         _thin(Path(folder) / "long.nc", machines[0])
         _stream(machines[0])
         _hold()
@@ -111,6 +114,11 @@ def _check(path: Path, options: ReadingOptions) -> None:
             census = count(census, chunk)
             points.append(points_of(chunk))
         points_file(points)
+
+
+def _clock(path: Path, setup: Setup) -> None:
+    with reading(path) as opened:
+        cycle_time(planned(opened.chunks, setup.machine, setup.planning.path_tolerance), setup.machine)
 
 
 def _simulate(path: Path, setup: Setup, options: ReadingOptions) -> None:

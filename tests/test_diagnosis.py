@@ -169,6 +169,7 @@ def test_after_warming_no_command_compiles_anything(tmp_path):
     long = tmp_path / "long.nc"  # read by compiled code
     long.write_text("G21 G90\nF3000\n" + "".join(f"G1 X{i % 7} Y{i % 5}\n" for i in range(8000)) + "M2\n")
     commands = [["check", *map(str, samples), str(long)], ["doctor", "--warm"]]
+    commands += [["check", "--time", *map(str, samples), str(long)]]
     commands += [["simulate", str(sample)] for sample in samples]
     commands += [["simulate", str(samples[0]), "-o", str(tmp_path / "run")]]
     commands += [["apply", str(samples[0]), "-o", str(tmp_path / name)] for name in ("out.csv", "out.nc")]

@@ -46,6 +46,7 @@ TWINS = {
     "kernels/linear.py": ("np.linalg", "test_kinematics.py"),
     "kernels/noise.py": ("naive.normal_noise", "test_noise.py"),
     "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),
+    "kernels/passing.py": ("naive.passing_times", "test_cycle_time.py"),
     "kernels/path_limits.py": ("naive.path_excesses", "test_path_limits.py"),
     "kernels/plain_moves.py": ("COMPILED_FROM", "test_plain_moves.py"),  # the interpreter in Python
     "kernels/plain_rows.py": ("read_rows", "test_plain_rows.py"),  # the reader in Python

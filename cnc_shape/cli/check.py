@@ -7,13 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cnc_shape.cli.options import BlockDelete, Closed, Dialect, Json, PathStyle, Quiet
+from cnc_shape.cli.options import (
+    MACHINE_SUFFIXES,
+    BlockDelete,
+    Closed,
+    Dialect,
+    Force,
+    Json,
+    PathStyle,
+    Quiet,
+)
 
 if TYPE_CHECKING:
-    from cnc_shape.census import Census
-    from cnc_shape.readers import Reading, ReadingOptions
+    from collections.abc import Iterator
 
-MACHINE_SUFFIXES = (".yaml", ".yml")
+    from cnc_shape.arrays import FloatArray, IntArray
+    from cnc_shape.census import Census
+    from cnc_shape.cli.cycle_time import Clock
+    from cnc_shape.config.setup import Setup
+    from cnc_shape.program import Program
+    from cnc_shape.readers import Reading, ReadingOptions
 
 
 def check(
@@ -25,7 +38,19 @@ def check(
     ] = None,
     machine: Annotated[
         str | None,
-        typer.Option("-m", "--machine", envvar="CNC_SHAPE_MACHINE", help="Machine file with the tool table."),
+        typer.Option(
+            "-m",
+            "--machine",
+            envvar="CNC_SHAPE_MACHINE",
+            help="Machine file: its tools, with --time its limits.",
+        ),
+    ] = None,
+    time: Annotated[
+        bool, typer.Option("--time", help="Plan the motion: its cycle time, and where time is lost.")
+    ] = False,
+    times: Annotated[
+        str | None,
+        typer.Option(metavar="OUT.csv", help="Write the time of every move of one file; implies --time."),
     ] = None,
     jacobian: Annotated[
         bool, typer.Option("--jacobian", help="Print the machine's Jacobian, by every formula it has.")
@@ -49,6 +74,7 @@ def check(
     max_coordinate_mm: Annotated[
         float | None, typer.Option(help="Largest coordinate.", show_default="1e6")
     ] = None,
+    force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> int:
@@ -67,21 +93,27 @@ def check(
     if not files or pose is not None:
         reason = "check needs a FILE" if not files else "--pose goes with --jacobian"
         raise OptionError(reason, hint="name programs, CSV or machine files; or -m MACHINE --jacobian")
-    tools = _tools(machine, quiet=quiet)
+    setup = _setup(machine, quiet=quiet) if machine is not None or time or times is not None else None
     options = limited(
-        named_options(dialect, path, tools, block_delete=block_delete, closed=closed),
+        named_options(dialect, path, setup.tools if setup else (), block_delete=block_delete, closed=closed),
         blocks=max_blocks,
         file_bytes=max_file_bytes,
         line_bytes=max_line_bytes,
         coordinate=max_coordinate_mm,
     )
     _one_target(files, points)
+    clock: Clock | None = None
+    if setup is not None and (time or times is not None):
+        from cnc_shape.cli.cycle_time import Clock, check_times
+
+        target = None if times is None else check_times(files, times, force=force)
+        clock = Clock(setup, target, force, quiet, silent=quiet or json)
     results: list[dict[str, Any]] = []
     status = DONE
     for file in files:
         try:
-            with progress("reading", None, quiet=quiet or json):
-                result = _check(file, options, points)
+            with progress("reading", None, quiet=quiet or json or clock is not None):
+                result = _check(file, options, points, clock)
         except CncShapeError as error:
             if len(files) == 1:
                 raise
@@ -97,15 +129,13 @@ def check(
     return status
 
 
-def _tools(machine: str | None, *, quiet: bool) -> Any:
-    if machine is None:
-        return ()
+def _setup(machine: str | None, *, quiet: bool) -> Setup:
     from cnc_shape.cli.output import warn
     from cnc_shape.config.machine_file import load_machine
 
     setup = load_machine(machine)
     warn(setup.warnings, quiet=quiet)
-    return setup.tools
+    return setup
 
 
 def _one_target(files: list[str], points: str | None) -> None:
@@ -121,7 +151,7 @@ def _one_target(files: list[str], points: str | None) -> None:
         )
 
 
-def _check(file: str, options: ReadingOptions, points: str | None) -> dict[str, Any]:
+def _check(file: str, options: ReadingOptions, points: str | None, clock: Clock | None) -> dict[str, Any]:
     if Path(file).suffix.lower() in MACHINE_SUFFIXES:
         from cnc_shape.config.check import check_machine
 
@@ -131,17 +161,30 @@ def _check(file: str, options: ReadingOptions, points: str | None) -> dict[str, 
     from cnc_shape.writers.points import points_file, points_of
     from cnc_shape.writers.publish import publish
 
-    with reading(file, options) as opened:
-        census: Census | None = None
-        rows: list[dict[str, Any]] = []
-        for chunk in opened.chunks:
+    census: Census | None = None
+    rows: list[dict[str, FloatArray | IntArray]] = []
+
+    def counted(chunks: Iterator[Program]) -> Iterator[Program]:
+        nonlocal census
+        for chunk in chunks:
             census = count(census, chunk)
             if points is not None:
                 rows.append(points_of(chunk))
+            yield chunk
+
+    with reading(file, options) as opened:
+        told: dict[str, Any] = {}
+        if clock is not None:
+            from cnc_shape.cli.cycle_time import time_of
+
+            told["time"] = time_of(opened, counted(opened.chunks), clock)
+        else:
+            for _ in counted(opened.chunks):
+                pass
         assert census is not None  # a reader yields one chunk at least
         if points is not None:
             publish(points, points_file(rows), force=True)
-        return _result(opened, census)
+        return _result(opened, census) | told
 
 
 def _result(opened: Reading, census: Census) -> dict[str, Any]:
@@ -192,58 +235,16 @@ def _show(result: dict[str, Any], *, quiet: bool) -> None:
             print_error(f"{result['file']}:{warning['line']}: warning: {warning['message']}")
 
 
-def _loop(loop: dict[str, float | None]) -> str:
-    """Say the margins of a loop in one line."""
-    if loop["max_sensitivity"] is None:
-        return "none"
-    told = {
-        "gain margin {:.3g}": loop["gain_margin"],
-        "phase margin {:.3g}°": loop["phase_margin_deg"],
-        "Ms {:.3g}": loop["max_sensitivity"],
-        "cross-coupling stable below {:.4g} 1/s": loop["largest_stable_cross_coupling_per_s"],
-    }
-    return _told(told)
-
-
-def _velocity_loops(loop: dict[str, float | None]) -> str:
-    """Say the margins of servo motors' velocity loops in one line."""
-    return _told(
-        {
-            "gain margin {:.3g} dB": loop["velocity_loop_gain_margin_db"],
-            "phase margin {:.3g}°": loop["velocity_loop_phase_margin_deg"],
-            "Ms {:.3g}": loop["velocity_loop_max_sensitivity"],
-        }
-    )
-
-
-def _told(numbers: dict[str, float | None]) -> str:
-    return ", ".join(text.format(number) for text, number in numbers.items() if number is not None)
-
-
 def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
     if result["dialect"] == "machine":
-        modes = ", ".join(f"{axis.upper()} {count}" for axis, count in result["modes"].items())
-        shapers = ", ".join(f"{axis.upper()} {entry['type']}" for axis, entry in result["shapers"].items())
-        kinds: dict[str, list[str]] = {}
-        for joint, drive in result["joints"].items():
-            kinds.setdefault(drive, []).append(joint)
-        joints = ", ".join(f"{' '.join(names)} {drive}" for drive, names in kinds.items())
-        return [
-            ("machine", result["name"]),
-            ("kinematics", result["kinematics"]),
-            ("joints", joints),
-            ("modes", modes or "none"),
-            *(("", f"{mode['axis'].upper()}: {mode['summary']}") for mode in result["position_modes"]),
-            ("shapers", shapers or "none"),
-            ("loop", _loop(result["loop"])),
-            *([("velocity loops", told)] if (told := _velocity_loops(result["loop"])) else []),
-            *([("motors", ", ".join(result["motor_terms"]))] if result["motor_terms"] else []),
-            *(
-                [("disturbed", "; ".join(map(_disturbance, result["disturbances"])))]
-                if result["disturbances"]
-                else []
-            ),
-        ]
+        from cnc_shape.cli.machine_facts import machine_facts
+
+        return machine_facts(result)
+    time: list[tuple[str, str]] = []
+    if "time" in result:
+        from cnc_shape.cli.cycle_time import time_facts
+
+        time = time_facts(result["time"])
     because = f" ({result['dialect_evidence']})" if result["dialect_evidence"] else ""
     moves = ", ".join(f"{count} {name}" for name, count in result["moves"].items() if count) or "none"
     low, high = result["bounds_mm"]["min"], result["bounds_mm"]["max"]
@@ -263,10 +264,5 @@ def _facts(result: dict[str, Any]) -> list[tuple[str, str]]:
             "ends at",
             "  ".join(f"{axis.upper()} {value:.3f}" for axis, value in result["final_position"].items()),
         ),
+        *time,
     ]
-
-
-def _disturbance(entry: dict[str, Any]) -> str:
-    if entry["type"] == "encoder_noise":
-        return f"encoder_noise {entry['standard_deviation_counts']:g} counts"
-    return f"{entry['direction']} {entry['largest_torque_nm']:g} N m {entry['profile']}"

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+MACHINE_SUFFIXES = (".yaml", ".yml")  # of machine files among the files that a command is given
 Machine = Annotated[
     str | None,
     typer.Option(

@@ -6,14 +6,24 @@ import logging
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from cnc_shape.cli.output import print_error
 
 if TYPE_CHECKING:
-    from cnc_shape.motion import Block
+    from cnc_shape.toolpath import Toolpath
 
 Advance = Callable[[float], None]
+
+
+class _Stretch(Protocol):
+    """What may bring a piece of the program along."""
+
+    @property
+    def toolpath(self) -> Toolpath | None: ...
+
+
+S = TypeVar("S", bound=_Stretch)
 
 
 class _Told(logging.Handler):
@@ -53,8 +63,8 @@ def progress(what: str, total: float | None, *, quiet: bool) -> Generator[Advanc
         kernels.removeHandler(told)
 
 
-def line_by_line(blocks: Iterable[Block], advance: Advance) -> Iterator[Block]:
-    """Hand on the blocks of a motion; advance by the lines of the program that each has brought."""
+def line_by_line(blocks: Iterable[S], advance: Advance) -> Iterator[S]:
+    """Hand on the stretches of a motion; advance by the lines of the program that each has brought."""
     done = 0
     for block in blocks:
         yield block
