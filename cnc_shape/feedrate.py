@@ -97,7 +97,7 @@ def scanning(
         limit_v2, straight = speed_limits(
             asked, whole.length, feed_rate, rotary_only(whole), velocity, acceleration
         )
-        along = _along(whole, path_limits)
+        along = accelerations_along(whole, path_limits)
         if along.size:
             straight = straight_along(asked, straight, along)
         reach_v2, free = backward(
@@ -163,8 +163,8 @@ def chord_feed_rate(path: Path, path_limits: PathLimits) -> FloatArray:
     )
 
 
-def _along(path: Path, path_limits: PathLimits) -> FloatArray:
-    """Limit of the acceleration along each cell, (k,) mm/s^2; (0,) where there is none."""
+def accelerations_along(path: Path, path_limits: PathLimits) -> FloatArray:
+    """Return the limit of the acceleration along each cell, (k,) mm/s^2; (0,) where there is none."""
     if np.isinf(path_limits.acceleration):
         return frozen(np.empty(0))
     return frozen(np.where(path.stretch == 0.0, np.inf, path_limits.acceleration))
