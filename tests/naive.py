@@ -1128,7 +1128,9 @@ def row_distance(toolpath, row, points, low, high):
     width = high - low
     share = low + 0.5 * width
     for _ in range(5):  # closer and closer about the nearest of a grid
-        grid = np.clip(share[:, None] + width[:, None] * np.linspace(-0.5, 0.5, 41), low[:, None], high[:, None])
+        grid = np.clip(
+            share[:, None] + width[:, None] * np.linspace(-0.5, 0.5, 41), low[:, None], high[:, None]
+        )
         found = curve_points(toolpath, row, grid.ravel()).reshape(*grid.shape, 3)
         distance = np.linalg.norm(points[:, None] - found, axis=2)
         nearest = distance.argmin(axis=1)
