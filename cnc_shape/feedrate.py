@@ -18,7 +18,7 @@ import numpy as np
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.kernels.path_limits import chord_speeds, straight_along
-from cnc_shape.kernels.speed_limits import speed_limits
+from cnc_shape.kernels.speed_limits import almost_straight, speed_limits
 from cnc_shape.kernels.time_law import backward, forward
 from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
 from cnc_shape.smoothing import Path, join_paths
@@ -100,6 +100,8 @@ def scanning(
         along = accelerations_along(whole, path_limits)
         if along.size:
             straight = straight_along(asked, straight, along)
+        else:
+            limit_v2, straight = almost_straight(asked, whole.length, limit_v2, straight, acceleration)
         reach_v2, free = backward(
             asked, whole.length, whole.stop, limit_v2, straight, acceleration, along, before.before_v2
         )
