@@ -27,7 +27,7 @@ from cnc_shape.recording.extremes import Extremes
 from cnc_shape.timing import PLAIN
 
 BUCKETS = 4096  # a power of two; at least half of them are in use
-DRAWN_BUCKETS = 2048  # of the path, each of up to eight points
+DRAWN_BUCKETS = 8192  # of the path, each of up to eight points
 FIRST_WIDTH = 2.0**-20  # s or mm, of a bucket at the start
 
 
@@ -36,7 +36,7 @@ class Peak:
     """The largest use of one limit."""
 
     share: float  # -, of the limit
-    line: int  # source line
+    line: int  # first source line that has it
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,7 @@ class Course:
     velocity: FloatArray  # (k,d) -, largest share of the limit
     acceleration: FloatArray  # (k,d) -
     jerk: FloatArray  # (k,d) -, 0 without a limit
+    reached: FloatArray  # (k,) mm of path over time, s along the path, at the end of each bucket
 
     @property
     def at(self) -> FloatArray:
@@ -76,8 +77,13 @@ class LimitUse:
     over_time: Course
     along_path: Course
     path: FloatArray  # (p,3) mm, the planned path to draw
-    speed: FloatArray  # (p,) mm/s, there
-    rapid: BoolArray  # (p,) where no feed is programmed
+    speed: FloatArray  # (p-1,) mm/s, mean from point to point
+    rapid: BoolArray  # (p-1,) where no feed is programmed from point to point
+
+    @property
+    def travels(self) -> bool:
+        """Whether anything moves in XYZ."""
+        return bool(np.ptp(self.path, axis=0).any())
 
 
 class LimitWatch:
@@ -87,7 +93,7 @@ class LimitWatch:
         self._machine = machine
         self._buckets = buckets
         self._widths = np.full(2, FIRST_WIDTH)
-        self._points = Extremes(_outstanding, 8, 5, drawn)
+        self._points = Extremes(_outstanding, 8, 7, drawn)
         self._axes: tuple[str, ...] = ()
         self._moved: tuple[str, ...] = ()
 
@@ -104,23 +110,18 @@ class LimitWatch:
         if not self._axes:
             self._begin(path.axes)
         law = (
-            profile.duration,
-            profile.u,
-            profile.velocity,
-            profile.acceleration,
-            profile.jerk,
-            profile.cell,
-        )
-        fold_pieces(
-            profile.time, *law, path.coefficients, path.feed_rate, rotary_only(path), path.arc_length,
-            path.stretch, path.line, self._widths, self._over_time, self._along_path, self._peaks,
-            self._lines,
+            profile.time, profile.duration, profile.u, profile.velocity, profile.acceleration, profile.jerk,
+            profile.cell, path.coefficients, path.feed_rate,
         )  # fmt: skip
-        self._points.add(drawn_points(*law, path.coefficients, path.feed_rate, path.stretch))
+        fold_pieces(
+            *law, rotary_only(path), path.arc_length, path.stretch, path.line, self._widths, self._over_time,
+            self._along_path, self._peaks, self._lines,
+        )  # fmt: skip
+        self._points.add(drawn_points(*law, path.arc_length, path.stretch))
 
     def found(self) -> LimitUse | None:
         """What was asked of the limits; None where nothing was planned. Call it after the last block."""
-        if not self._axes or self._lines[1] < 0:
+        if not self._axes:
             return None
         limits = [axis.limits for axis in self._machine.with_axes(self._axes).axes]
         columns = [k for k, axis in enumerate(self._axes) if axis in self._moved]
@@ -131,17 +132,17 @@ class LimitWatch:
             over_time=_course(self._over_time, float(self._widths[0]), limits, columns),
             along_path=_course(self._along_path, float(self._widths[1]), limits, columns),
             path=frozen(rows[:, :3]),
-            speed=frozen(rows[:, 3]),
-            rapid=rows[:, 4] > 0.0,
+            speed=frozen(np.diff(rows[:, 4]) / np.maximum(np.diff(rows[:, 5]), 1e-12)),
+            rapid=(rows[:-1, 6] > 0.0) & (rows[1:, 6] > 0.0),
         )
 
     def _begin(self, axes: tuple[str, ...]) -> None:
         self._axes = axes
-        columns = 3 + 3 * len(axes)
+        columns = 4 + 3 * len(axes)
         self._over_time = np.full((self._buckets, columns), -np.inf)
         self._along_path = np.full((self._buckets, columns), -np.inf)
-        self._peaks = np.full(columns - 2, -1.0)
-        self._lines: IntArray = np.full(columns - 2, -1, np.int64)
+        self._peaks = np.zeros(columns - 3)
+        self._lines: IntArray = np.zeros(columns - 3, np.int64)
 
     def _axis_use(self, column: int, limits: Limits) -> AxisUse:
         peaks, lines = self._peaks[1:].reshape(3, -1), self._lines[1:].reshape(3, -1)
@@ -159,13 +160,20 @@ def _course(buckets: FloatArray, width: float, limits: Sequence[Limits], columns
     rows = buckets[: seen[-1] + 1 if seen.size else 0].copy()
     feed_rate = np.where(rows[:, 2] > -np.inf, rows[:, 2], np.nan)
     rows[rows[:, 0] == -np.inf] = np.nan
-    uses = rows[:, 3:].reshape(rows.shape[0], 3, -1)
+    uses = rows[:, 4:].reshape(rows.shape[0], 3, -1)
     velocity, acceleration, jerk = (
         frozen((uses[:, n] / np.array([getattr(limit, name) for limit in limits]))[:, columns])
         for n, name in enumerate(("velocity", "acceleration", "jerk"))
     )
     return Course(
-        width, frozen(rows[:, 0]), frozen(-rows[:, 1]), frozen(feed_rate), velocity, acceleration, jerk
+        width,
+        frozen(rows[:, 0]),
+        frozen(-rows[:, 1]),
+        frozen(feed_rate),
+        velocity,
+        acceleration,
+        jerk,
+        frozen(rows[:, 3]),
     )
 
 

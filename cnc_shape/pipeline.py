@@ -256,7 +256,7 @@ def run(
         The signals do not fit into the folder for temporary files.
     """
     trials: list[Trial] = []
-    outline, watch = Outline(), LimitWatch(setup.machine)
+    outline, watch = Outline(), LimitWatch(setup.machine) if record else None
     samples, cycle_time = 0, 0.0
     for block in blocks:
         unshaped = block.timing is None or block.timing == PLAIN
@@ -275,7 +275,7 @@ def run(
             ]
         if record and unshaped and block.toolpath is not None:
             outline.add(block.toolpath)
-        if record:
+        if watch is not None:
             watch.advance(block)
         for watcher in (*trials, *observers):
             watcher.advance(block)
@@ -287,4 +287,5 @@ def run(
         tuple(trial.summary() for trial in trials),
     )  # fmt: skip
     signals = tuple(found for trial in trials if (found := trial.signals()) is not None)
-    return Run(summary, signals, outline.points(), watch.found())
+    use = None if watch is None else watch.found()
+    return Run(summary, signals, outline.points(), use)

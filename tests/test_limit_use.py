@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import tracemalloc
 from dataclasses import fields, replace
 
@@ -11,16 +13,25 @@ import pytest
 from motions import MILL, chunks, lines, wander
 from numpy.testing import assert_allclose, assert_array_equal
 from paths import dwell, line, toolpath
+from runs import make_run
 from test_path_limits import circle
 
+from cnc_shape.api import simulate_program
 from cnc_shape.arrays import frozen
 from cnc_shape.certificate import worst_violation
+from cnc_shape.config.bundled import bundled
+from cnc_shape.config.machine_file import load_machine
 from cnc_shape.feedrate import Profile
 from cnc_shape.limit_use import Course, LimitUse, LimitWatch
 from cnc_shape.limits import Limits
 from cnc_shape.machine import Axis, Machine
 from cnc_shape.motion import Block
 from cnc_shape.planning import plan, planning
+from cnc_shape.program import Motion
+from cnc_shape.report.folder import write_report
+from cnc_shape.report.limit_figures import DRAWN, limits_figure, speed_figure
+from cnc_shape.report.limit_table import limits_json
+from cnc_shape.report.style import render
 from cnc_shape.smoothing import Smoothing, smooth, smoothing
 from cnc_shape.timing import PLAIN, Timing
 from cnc_shape.trajectory import sample
@@ -200,7 +211,8 @@ def test_rapids_have_no_feed_and_rotary_axes_alone_no_speed():
     assert np.isnan(course.feed_rate[turning][1:-1]).all()
     assert course.feed_rate[-2] == 50.0
     assert use.rapid[0]
-    assert not use.rapid[-2]  # the last point is the rest at the end
+    assert not use.rapid[-2:].any()
+    assert use.speed[use.rapid].max() <= 200.0 + 1e-9
 
 
 def test_memory_does_not_grow_with_the_program():
@@ -216,3 +228,114 @@ def test_memory_does_not_grow_with_the_program():
     assert held[1] - held[0] < 10_000
     watching.advance(block(one))
     assert watching.found().over_time.at.size <= 256
+
+
+MIXED = [*GENTLE[:2], Limits(100.0, 1000.0)]  # no jerk limit in Z
+SQUARE = toolpath(
+    line(20.0, 0.0, 0.0, feed_rate=50.0), line(20.0, 10.0, 0.0, feed_rate=50.0),
+    line(20.0, 10.0, 5.0, feed_rate=30.0),
+    {"motion": Motion.RAPID, "target": (0.0, 0.0, 5.0), "feed_rate": np.inf},
+)  # fmt: skip
+
+
+def texts(figure) -> str:
+    found = [text.get_text() for ax in figure.axes for text in (ax.title, ax.xaxis.label, ax.yaxis.label)]
+    found += [ax.get_title(loc="left") for ax in figure.axes]
+    found += [text.get_text() for ax in figure.axes for text in ax.texts]
+    found += [text.get_text() for ax in figure.axes if ax.legend_ for text in ax.legend_.get_texts()]
+    return "|".join(found)
+
+
+@pytest.mark.parametrize("along_path", [False, True])
+def test_three_panels_show_feed_acceleration_and_jerk_under_their_limits(along_path):
+    use = watch([planned(SQUARE, MIXED)], MIXED)
+    figure = limits_figure(use, along_path=along_path)
+    said = texts(figure)
+    for text in ("speed (mm/s)", "share of the limit (-)", "programmed feed", "X|Y|Z|limit", "none for Z"):
+        assert text in said
+    assert ("path length (mm)" if along_path else "time (s)") in said
+    feed, acceleration, jerk = figure.axes
+    assert [len(ax.lines) for ax in (acceleration, jerk)] == [4, 3]  # one an axis, and the limit
+    for ax, name in ((acceleration, "acceleration"), (jerk, "jerk")):
+        for drawn, axis in zip(ax.lines[:-1], use.axes, strict=False):
+            assert max(drawn.get_ydata()) == pytest.approx(getattr(axis, name).share, rel=1e-6)
+            assert len(drawn.get_ydata()) <= DRAWN
+    programmed = next(shown for shown in feed.lines if shown.get_label() == "programmed feed")
+    assert set(programmed.get_ydata()[np.isfinite(programmed.get_ydata())]) == {50.0, 30.0}
+    svg = render(figure, "svg")
+    assert len(svg) < 400_000
+    assert render(limits_figure(use, along_path=along_path), "svg") == svg
+
+
+def test_without_jerk_limits_the_panel_says_so():
+    figure = limits_figure(watch([planned(SQUARE, MILL)], MILL))
+    assert "no jerk limit" in texts(figure)
+    assert len(figure.axes[2].lines) == 1
+
+
+def test_the_path_is_coloured_by_its_speed_and_rapids_are_grey():
+    use = watch([planned(SQUARE, MILL)], MILL)
+    figure = speed_figure(use)
+    rapids, cut_moves = figure.axes[0].collections
+    assert len(rapids.get_segments()) == use.rapid.sum() > 0
+    assert max(cut_moves.get_array()) == pytest.approx(50.0)
+    assert cut_moves.norm.vmax == pytest.approx(50.0)
+    assert "speed of the tool (mm/s)" in texts(figure)
+    assert "X (mm)" in texts(figure)
+    assert "rapids are grey" in texts(figure)
+
+
+def test_a_long_path_becomes_a_picture_in_the_figure():
+    path = wander(np.random.default_rng(11), 3000)
+    svg = render(speed_figure(watch([planned(path, MILL)], MILL)), "svg")
+    assert len(svg) < 600_000
+    assert not re.search(rb'href="(?!#|data:image/png;base64,)', svg)
+
+
+def test_mean_speeds_between_drawn_points_take_the_time_of_the_motion():
+    profile = planned(wander(np.random.default_rng(13), 500), MILL)
+    use = watch([profile], MILL, drawn=64)
+    steps = np.linalg.norm(np.diff(use.path, axis=0), axis=1)
+    moving = use.speed > 0.0
+    time = (steps[moving] / use.speed[moving]).sum()
+    assert time <= profile.end_time * (1.0 + 1e-6)
+    course = use.over_time
+    assert course.reached[-1] == pytest.approx(profile.path.arc_length[-1])
+    assert use.along_path.reached[-1] == pytest.approx(profile.end_time)
+
+
+def test_the_report_of_a_program_has_table_figures_and_numbers(tmp_path):
+    setup = load_machine(bundled("xy_stage.yaml"))
+    program = tmp_path / "part.nc"
+    program.write_text("G21 G90\nG1 X10 F6000\nY5\nX0 F3000\n")
+    run = simulate_program(program, setup, ["unshaped"])
+    use = run.limit_use
+    page = write_report(run, tmp_path / "run").read_text(encoding="utf-8")
+    told = json.loads((tmp_path / "run" / "results.json").read_text())["planned"]
+    assert told == limits_json(use)
+    assert list(told) == ["x", "y", "feed_share", "feed_line"]
+    assert told["x"]["acceleration_share"] == pytest.approx(1.0)
+    assert told["x"]["velocity_share"] == pytest.approx(0.2)
+    assert told["x"]["jerk_share"] is None
+    assert told["x"]["lines"] == {"velocity": 2, "acceleration": 2, "jerk": None}
+    assert told["feed_line"] == 2
+    assert "against their limits" in page
+    assert "The programmed feed is used up to 100.0 %, on line 2." in page
+    assert page.count("Along the path instead of time") == 1
+    names = {path.name for path in (tmp_path / "run" / "figures").iterdir()}
+    assert {"limits.svg", "limits_along_path.svg", "speed.svg"} <= names
+
+
+def test_a_time_trajectory_has_nothing_to_show_and_the_page_says_so(tmp_path):
+    run = simulate_program(bundled("circle_time.csv"), load_machine(bundled("xy_stage.yaml")), ["unshaped"])
+    assert run.limit_use is None
+    page = write_report(run, tmp_path / "run").read_text(encoding="utf-8")
+    assert "tells its own times: nothing was planned" in page
+    assert "planned" not in json.loads((tmp_path / "run" / "results.json").read_text())
+    assert not list((tmp_path / "run" / "figures").glob("limits*"))
+
+
+def test_nothing_is_kept_where_nothing_is_recorded():
+    assert make_run(60).limit_use is None
+    setup = load_machine(bundled("xy_stage.yaml"))
+    assert simulate_program(bundled("corner.nc"), setup, ["unshaped"], record=False).limit_use is None

@@ -1,9 +1,10 @@
 """What a time law asks of the axes, folded into buckets of time and of path as its pieces come.
 
 A bucket holds the largest of every quantity that was seen in it, so the largest of two neighbouring buckets
-is that of both, and buckets can be widened without what they were made from. A row of a bucket, 3 + 3 d
-columns: speed of the tool in XYZ, the same with its sign turned, feed rate; then velocity, acceleration and
-jerk, each without its sign, axis by axis.
+is that of both, and buckets can be widened without what they were made from. A row of a bucket, 4 + 3 d
+columns: speed of the tool in XYZ, the same with its sign turned, feed rate; how far along the path the motion
+is, or in buckets of path, at what time; then velocity, acceleration and jerk, each without its sign, axis by
+axis.
 """
 # pyright: basic
 
@@ -14,13 +15,14 @@ from cnc_shape.kernels.jerk_phases import moved
 
 POINTS = 9  # of every piece at least, as many as the certificate looks at
 SPREAD = 1.25  # -, by which the speed between two points may exceed that at them
+TIE = 1e-9  # -, two uses that differ by less are the same, and the first line has it
 APART = 0.25  # mm of path between points that are drawn
 MOST_DRAWN = 8  # of a piece
 
 
 @kernel
 def point_use(c, s, v, a, b, alone, feed_rate, row):
-    """Fill the row of a point; return the speed that the feed rate limits.
+    """Fill the row of a point but for time and place; return the speed that the feed rate limits.
 
     c (4,d): the cell's coefficients; s, v, a, b: path parameter and its derivatives; alone: 1 where rotary
     axes move alone, which have no speed in XYZ, and whose feed rate is none of it.
@@ -37,9 +39,9 @@ def point_use(c, s, v, a, b, alone, feed_rate, row):
             tool += qv * qv
         else:
             turning += qv * qv
-        row[3 + i] = abs(qv)
-        row[3 + axes + i] = abs(first * a + bend * v * v)
-        row[3 + 2 * axes + i] = abs(first * b + v * (3.0 * bend * a + third * v * v))
+        row[4 + i] = abs(qv)
+        row[4 + axes + i] = abs(first * a + bend * v * v)
+        row[4 + 2 * axes + i] = abs(first * b + v * (3.0 * bend * a + third * v * v))
     speed = np.sqrt(tool)
     row[0] = speed
     row[1] = -speed
@@ -61,9 +63,10 @@ def widen(buckets, width, end):
 
 
 @kernel
-def fold(row, buckets, bucket):
-    """Raise a bucket to a row; the last bucket takes what rounding puts beyond it."""
+def fold(row, reached, buckets, bucket):
+    """Raise a bucket to a row that has `reached` so far; the last takes what rounding puts beyond it."""
     bucket = min(bucket, buckets.shape[0] - 1)
+    row[3] = reached
     for j in range(row.size):
         if row[j] > buckets[bucket, j]:
             buckets[bucket, j] = row[j]
@@ -92,13 +95,13 @@ def fold_pieces(
 ):
     """Fold pieces of a time law into the buckets, in place.
 
-    widths (2,): s and mm, of `over_time` and `along_path`, (k,3+3d) each; k is even. peaks (1+3d,): largest
+    widths (2,): s and mm, of `over_time` and `along_path`, (k,4+3d) each; k is even. peaks (1+3d,): largest
     share of the feed rate, then velocity, acceleration and jerk of every axis, at `POINTS` points a piece;
     lines (1+3d,): where. A piece that spans many buckets is looked at in each of them.
     """
     axes = rows.shape[2]
-    row = np.empty(3 + 3 * axes)
-    most = np.empty(3 + 3 * axes)
+    row = np.zeros(4 + 3 * axes)
+    most = np.empty(4 + 3 * axes)
     for m in range(time.size):
         k = cell[m]
         v = speed[m]
@@ -125,18 +128,21 @@ def fold_pieces(
             for j in range(row.size):
                 most[j] = max(most[j], row[j])
             if not inside:
-                fold(row, over_time, int((time[m] + e) / widths[0]))
-                fold(row, along_path, int((place + stretch[k] * gone) / widths[1]))
+                there = place + stretch[k] * gone
+                fold(row, there, over_time, int((time[m] + e) / widths[0]))
+                fold(row, time[m] + e, along_path, int(there / widths[1]))
         if inside:
-            fold(most, over_time, first_bucket)
-            fold(most, along_path, first_place)
+            fold(most, end, over_time, first_bucket)
+            fold(most, time[m] + t, along_path, first_place)
         if ruled / feed_rate[k] > peaks[0]:
+            if ruled / feed_rate[k] > peaks[0] * (1.0 + TIE):
+                lines[0] = line[k]
             peaks[0] = ruled / feed_rate[k]
-            lines[0] = line[k]
         for j in range(3 * axes):
-            if most[3 + j] > peaks[1 + j]:
-                peaks[1 + j] = most[3 + j]
-                lines[1 + j] = line[k]
+            if most[4 + j] > peaks[1 + j]:
+                if most[4 + j] > peaks[1 + j] * (1.0 + TIE):
+                    lines[1 + j] = line[k]
+                peaks[1 + j] = most[4 + j]
         between = max(t / widths[0], SPREAD * fastest * stretch[k] * t / widths[1])
         if between > POINTS - 1:
             steps = int(np.ceil(between))
@@ -145,21 +151,24 @@ def fold_pieces(
                 here = v + e * (a + e * b / 2.0)
                 gone = moved(v, a, b, e)
                 point_use(rows[k], u[m] + gone, here, a + e * b, b, alone[k], feed_rate[k], row)
-                fold(row, over_time, int((time[m] + e) / widths[0]))
-                fold(row, along_path, int((place + stretch[k] * gone) / widths[1]))
+                there = place + stretch[k] * gone
+                fold(row, there, over_time, int((time[m] + e) / widths[0]))
+                fold(row, time[m] + e, along_path, int(there / widths[1]))
 
 
 @kernel
-def drawn_points(duration, u, speed, path_acceleration, path_jerk, cell, rows, feed_rate, stretch):
-    """Points of the path that are drawn with their speed, (n,5): XYZ in mm, mm/s, 1 in a rapid and else 0.
+def drawn_points(
+    time, duration, u, speed, path_acceleration, path_jerk, cell, rows, feed_rate, arc_length, stretch
+):
+    """Points of the path that are drawn, (n,7): XYZ in mm, speed in mm/s, place in mm, time in s, rapid.
 
-    Each piece gives its start, and more where it is long.
+    Each piece gives its start, and more where it is long. The last column is 1 in a rapid and else 0.
     """
     counts = np.empty(duration.size, np.int64)
     for m in range(duration.size):
         travel = stretch[cell[m]] * moved(speed[m], path_acceleration[m], path_jerk[m], duration[m])
         counts[m] = int(min(max(np.ceil(travel / APART), 1.0), MOST_DRAWN))
-    points = np.empty((counts.sum(), 5))
+    points = np.empty((counts.sum(), 7))
     row = 0
     for m in range(duration.size):
         c = rows[cell[m]]
@@ -173,6 +182,8 @@ def drawn_points(duration, u, speed, path_acceleration, path_jerk, cell, rows, f
                 qv = (c[1, i] + s * (2.0 * c[2, i] + 3.0 * c[3, i] * s)) * v
                 square += qv * qv
             points[row, 3] = np.sqrt(square)
-            points[row, 4] = 1.0 if np.isinf(feed_rate[cell[m]]) else 0.0
+            points[row, 4] = arc_length[cell[m]] + stretch[cell[m]] * s
+            points[row, 5] = time[m] + e
+            points[row, 6] = 1.0 if np.isinf(feed_rate[cell[m]]) else 0.0
             row += 1
     return points
