@@ -20,6 +20,7 @@ from cnc_shape.kernels.jerk_phases import MOST_STEPS, moved, put, time_to
 SHORTEST = 1e-12  # s, a shorter phase is rounding
 NO_KINK = 1e-9  # s, times the jerk: a smaller step of acceleration is rounding
 NEWTON_STEPS = 12
+NEAR_ENOUGH = 1e-14  # -, of a phase, to the place where an arc is highest
 ROUNDING = 1e-13  # -, of places and speeds
 POP, TANGENT, END = 0, 1, 2  # what an arc does: passes below P, touches Q, meets the end of Q
 
@@ -115,59 +116,58 @@ def through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
 def highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
     """Largest excess of the arc that leaves P at `t1` over Q.
 
+    There the accelerations of both are the same, which gives the time on the arc by that on Q: the places
+    are left to be made the same, and what parts them grows with the time on Q.
+
     Returns
     -------
     excess
-        Of speed; negative where the arc comes to rest before it reaches Q.
+        Of speed; -1 where the arc comes to rest before it reaches Q.
     t, t2
         Times on the arc and on Q where it is.
     at_end
         Whether that is the end of Q, and the arc is still getting nearer there.
     """
-    u1 = moved(vp, ap, bp, t1)
     v1 = vp + t1 * (ap + t1 * bp / 2.0)
     a1 = ap + bp * t1
     rest = (a1 + np.sqrt(a1 * a1 + 2.0 * jerk * v1)) / jerk
     reach = moved(v1, a1, -jerk, rest)
-    before = uq - u1
+    before = uq - moved(vp, ap, bp, t1)
     if reach < before:
         return -1.0, rest, 0.0, False
-    t = time_to(v1, a1, -jerk, rest, before) if before > 0.0 else 0.0
-    if a1 - jerk * t <= aq:
+    t = (a1 - aq) / jerk
+    if t <= 0.0 or (t < rest and moved(v1, a1, -jerk, t) <= before):
+        t = time_to(v1, a1, -jerk, rest, before) if before > 0.0 else 0.0
         return v1 + t * (a1 - t * jerk / 2.0) - vq, t, 0.0, False
-    low = 0.0
-    high = tq
     whole = before + moved(vq, aq, bq, tq)
-    if whole <= reach:
+    t = (a1 - aq - bq * tq) / jerk
+    if whole <= reach and (t >= rest or (t >= 0.0 and whole <= moved(v1, a1, -jerk, t))):
         t = time_to(v1, a1, -jerk, rest, whole)
-        if a1 - jerk * t >= aq + bq * tq:
-            excess = v1 + t * (a1 - t * jerk / 2.0) - (vq + tq * (aq + tq * bq / 2.0))
-            return excess, t, tq, True
-    t2 = 0.0
+        return v1 + t * (a1 - t * jerk / 2.0) - (vq + tq * (aq + tq * bq / 2.0)), t, tq, True
+    low = 0.0
+    high = min(tq, (a1 - aq) / bq) if bq > 0.0 else tq
+    t2 = 0.5 * high
     for _ in range(MOST_STEPS):
-        t2 = 0.5 * (low + high)
-        if not low < t2 < high:
-            break
-        place = before + moved(vq, aq, bq, t2)
-        if place >= reach:
-            high = t2
-            continue
-        t = time_to(v1, a1, -jerk, rest, place) if place > 0.0 else 0.0
-        if a1 - jerk * t > aq + bq * t2:
+        t = min((a1 - aq - bq * t2) / jerk, rest)
+        gap = before + moved(vq, aq, bq, t2) - moved(v1, a1, -jerk, t)
+        if gap < 0.0:
             low = t2
         else:
             high = t2
-    place = before + moved(vq, aq, bq, t2)
-    t = rest if place >= reach else (time_to(v1, a1, -jerk, rest, place) if place > 0.0 else 0.0)
+        slope = vq + t2 * (aq + t2 * bq / 2.0) + (v1 + t * (a1 - t * jerk / 2.0)) * bq / jerk
+        following = t2 - gap / slope if slope > 0.0 else 0.5 * (low + high)
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - t2) <= NEAR_ENOUGH * tq:
+            break
+        t2 = following
+    t = min(max((a1 - aq - bq * t2) / jerk, 0.0), rest)
     return v1 + t * (a1 - t * jerk / 2.0) - (vq + t2 * (aq + t2 * bq / 2.0)), t, t2, False
 
 
 @kernel
 def arc(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
     """Arc from P to Q: what it does, when it leaves P, how long it takes, when it touches Q."""
-    ue = uq + moved(vq, aq, bq, tq)
-    ve = vq + tq * (aq + tq * bq / 2.0)
-    ae = aq + bq * tq
     kink = (ap + bp * tp - aq) / jerk
     good, t1, t2, t = tangent(
         vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk,
@@ -178,21 +178,25 @@ def arc(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
     excess, t, t2, at_end = highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, 0.0)
     if excess > 0.0:
         return POP, 0.0, 0.0, 0.0
+    ue = uq + moved(vq, aq, bq, tq)
+    ve = vq + tq * (aq + tq * bq / 2.0)
+    ae = aq + bq * tq
     low = 0.0
     high = tp
+    t1 = 0.5 * tp
+    last = np.inf
     for step in range(MOST_STEPS):
-        t1 = 0.5 * (low + high)
         if not low < t1 < high:
             break
-        more, s, s2, more_end = highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1)
-        if more > 0.0:
+        excess, s, s2, more_end = highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1)
+        if excess > 0.0:
             high = t1
         else:
             low = t1
             t = s
             t2 = s2
             at_end = more_end
-        if step % 8 == 7:
+        if step % 4 == 3:
             if more_end:
                 good, n1, n = through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, s)
                 if good:
@@ -201,6 +205,15 @@ def arc(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk):
                 good, n1, n2, n = tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, s2)
                 if good:
                     return TANGENT, n1, n, n2
+        a1 = ap + bp * t1
+        v1 = vp + t1 * (ap + t1 * bp / 2.0)
+        end = v1 + s * (a1 - s * jerk / 2.0)
+        slope = a1 + bp * s - (a1 - jerk * s) * (v1 + s * (a1 + s * bp / 2.0)) / end
+        newton = excess != -1.0 and slope > 0.0 and abs(excess) < 0.5 * last
+        last = abs(excess)
+        t1 = t1 - excess / slope if newton else 0.5 * (low + high)
+        if not low < t1 < high:
+            t1 = 0.5 * (low + high)
     return (END if at_end else TANGENT), low, t, t2
 
 

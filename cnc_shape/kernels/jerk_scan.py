@@ -15,6 +15,7 @@ from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_caps import curved_caps
 from cnc_shape.kernels.jerk_phases import MOST_STEPS, last_speed, moved, put, speed_at, travel_time
 
+NEAR_ENOUGH = 1e-15  # -, of a cell, to the place where two laws cross
 PHASES = 4  # of a scan in one cell, at most
 
 
@@ -208,6 +209,36 @@ def mirrored(phases, cell, count, length):
 
 
 @kernel
+def crossing(rising, r, r_end, falling, f, f_end, h):
+    """Place in a cell of length `h` where a rising law, slower at first, meets a falling one."""
+    low = 0.0
+    high = h
+    slower = falling[f, 2] ** 2 - rising[r, 2] ** 2
+    faster = last_speed(rising, r_end - 1) ** 2 - last_speed(falling, f_end - 1) ** 2
+    place = h * slower / (slower + faster)
+    for _ in range(MOST_STEPS):
+        if not low < place < high:
+            place = 0.5 * (low + high)
+            if not low < place < high:
+                return low
+        n, t, up = speed_at(rising, r, r_end, place)
+        m, s, down = speed_at(falling, f, f_end, place)
+        gap = up - down
+        if gap == 0.0:
+            return place
+        if gap < 0.0:
+            low = place
+        else:
+            high = place
+        slope = (rising[n, 3] + t * rising[n, 4]) / up - (falling[m, 3] + s * falling[m, 4]) / down
+        step = gap / slope
+        if abs(step) <= NEAR_ENOUGH * h:
+            return place
+        place -= step
+    return low
+
+
+@kernel
 def envelope(rising, rising_cell, rising_count, falling, falling_cell, falling_count, length, phases, cell):
     """The lower of two laws, the one rising and the other falling in every cell; returns its phases' number.
 
@@ -235,18 +266,7 @@ def envelope(rising, rising_cell, rising_count, falling, falling_cell, falling_c
                 cell[m] = k
                 m += 1
         else:
-            low = 0.0
-            high = length[k]
-            for _ in range(MOST_STEPS):
-                place = 0.5 * (low + high)
-                if not low < place < high:
-                    break
-                _, _, up = speed_at(rising, r, r_end, place)
-                _, _, down = speed_at(falling, f, f_end, place)
-                if up < down:
-                    low = place
-                else:
-                    high = place
+            low = crossing(rising, r, r_end, falling, f, f_end, length[k])
             n, t, v = speed_at(rising, r, r_end, low)
             for p in range(r, n):
                 phases[m] = rising[p]
