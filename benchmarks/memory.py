@@ -11,11 +11,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks.machines import jerk_limited
 from benchmarks.measuring import CNC_SHAPE, Kind, Row, child, quantity, report, workshop, written
 
 SIZES = (100_000, 1_000_000)
 LONG_SIZES = (1_000_000, 10_000_000)
-COMMANDS = {"check": ("check", "--json"), "simulate": ("simulate", "--json", "--cases", "shaped")}
+SIMULATE = ("simulate", "--json", "--cases", "shaped")
+COMMANDS = {"check": ("check", "--json"), "simulate": SIMULATE, "simulate with a jerk limit": SIMULATE}
 MOST = 300.0  # MB
 
 
@@ -24,7 +26,8 @@ def rows(sizes: tuple[int, int]) -> Iterator[Row]:
     with workshop() as folder:
         programs = [written("raster", blocks, folder) for blocks in sizes]
         for name, words in COMMANDS.items():
-            command = [*CNC_SHAPE, *words]
+            machine = ("-m", str(jerk_limited(folder))) if "jerk" in name else ()
+            command = [*CNC_SHAPE, *words, *machine]
             child([*command, str(written("raster", 10, folder))], folder)
             short, long = (child([*command, str(program)], folder) for program in programs)
             beside = f"{name}, {sizes[0] / 1e6:g} M blocks"

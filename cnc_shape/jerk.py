@@ -1,23 +1,22 @@
 """The time law of a path under a jerk limit.
 
-Between two stops the law is planned as a whole (`kernels/jerk_law.py`): a chunk is planned up to its last
-stop, and what follows waits. An axis without a jerk limit is given one so high that its acceleration rises
-within a microsecond.
+The law is planned in windows that reach a few stopping distances ahead (`kernels/jerk_windows.py`); what
+their law depends on is data, never chunks. An axis without a jerk limit is given one so high that its
+acceleration rises within a microsecond.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import Profile, check_executable, chord_feed_rate, gentle, rotary_only
-from cnc_shape.kernels.jerk_law import path_law
 from cnc_shape.kernels.jerk_pieces import timed
+from cnc_shape.kernels.jerk_windows import windows_law
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
 from cnc_shape.smoothing import Path, join_paths
@@ -25,15 +24,23 @@ from cnc_shape.smoothing import Path, join_paths
 RISE_TIME = 1e-6  # s, in which an axis without jerk limit reaches its acceleration
 TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
 MOST_ROUNDS = 100  # of lowering the limits of cells
+WINDOW, LOOK_AHEAD = 4096, 4.0  # cells and stopping distances that are planned at once, at least
+PATIENCE = 1024  # cells that gather before a new attempt
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JerkState:
-    """Between two chunks: the cells behind the last stop, and when they begin."""
+    """Between two chunks: the cells whose law is not final, and what is known of it."""
 
     parts: tuple[Path, ...]
     clock: FloatArray  # (2,) s, its rounding error
     passed: int  # cells of the program before the first one
+    patience: int  # cells to gather before the next attempt
+    held: FloatArray  # (m,6) pieces of the window that is held back
+    held_cell: IntArray  # (m,)
+    marks: IntArray  # (2,) cells of it up to its joint, and up to its end; 0: there is none
+    speeds: FloatArray  # (2,) at its start and at its joint
+    counts: IntArray  # (5,) what planning has done so far (`kernels/jerk_windows.py`)
 
 
 JerkStep: TypeAlias = Callable[[JerkState | None, Path, bool], tuple[JerkState | None, Profile]]
@@ -58,25 +65,32 @@ def jerk_planning(
 
     def step(state: JerkState | None, path: Path, last: bool) -> tuple[JerkState | None, Profile]:
         check_executable(path, (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)))
-        before = state or JerkState((), frozen(np.zeros(2)), 0)
-        whole = join_paths((*before.parts, path)) if before.parts else path
-        stops = np.flatnonzero(whole.stop)
-        final = len(whole) if last else int(stops[-1]) if stops.size else 0
-        done = whole.cut(slice(0, final))
-        asked, feed_rate = gentle(done, chord_feed_rate(done, path_limits), gentleness, before.passed)
-        alone, clock = rotary_only(done), before.clock.copy()
-        limit_v2, straight = speed_limits(asked, done.length, feed_rate, alone, velocity, acceleration)
-        pieces, cell, stuck = path_law(
-            asked, done.length, done.stop, done.dwell, feed_rate, alone, limit_v2, straight, velocity,
-            acceleration, jerk, TOLERANCES, MOST_ROUNDS,
+        before = state or _START
+        parts = (*before.parts, path) if len(path) else before.parts
+        gathered = sum(len(part) for part in parts)
+        if gathered == 0 or (not last and gathered < before.patience):
+            waiting = None if last else replace(before, parts=parts)
+            return waiting, _profile(path.cut(slice(0, 0)), _NO_PIECES, _NO_CELLS)
+        whole = join_paths(parts)
+        asked, feed_rate = gentle(whole, chord_feed_rate(whole, path_limits), gentleness, before.passed)
+        alone, clock = rotary_only(whole), before.clock.copy()
+        marks, speeds, counts = before.marks.copy(), before.speeds.copy(), before.counts.copy()
+        limit_v2, straight = speed_limits(asked, whole.length, feed_rate, alone, velocity, acceleration)
+        pieces, cell, held, held_cell, final = windows_law(
+            asked, whole.length, whole.stop, whole.dwell, feed_rate, alone, limit_v2, straight, velocity,
+            acceleration, jerk, TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD, before.held.copy(),
+            before.held_cell.copy(), marks, speeds, counts,
         )  # fmt: skip
-        if stuck >= 0:
-            raise InfeasibleError("no time law keeps the jerk limit here", line=int(done.line[stuck]))
         timed(pieces, clock)
-        profile = _profile(done, pieces, cell)
+        profile = _profile(whole.cut(slice(0, final)), pieces, cell)
         if last:
             return None, profile
-        return JerkState((whole.cut(slice(final, None)),), frozen(clock), before.passed + final), profile
+        rest = whole.cut(slice(final, None))
+        now = JerkState(
+            (rest,), frozen(clock), before.passed + final, 2 * len(rest) + PATIENCE, frozen(held),
+            frozen_integers(held_cell), frozen_integers(marks), frozen(speeds), frozen_integers(counts),
+        )  # fmt: skip
+        return now, profile
 
     return step
 
@@ -88,3 +102,10 @@ def _jerk(limit: Limits) -> float:
 def _profile(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
     time, duration, u, velocity, acceleration, jerk = (frozen(pieces[:, column]) for column in range(6))
     return Profile(path, time, duration, u, velocity, acceleration, jerk, frozen_integers(cell))
+
+
+_NO_PIECES, _NO_CELLS = np.empty((0, 6)), np.empty(0, np.int64)
+_START = JerkState(
+    (), frozen(np.zeros(2)), 0, PATIENCE, frozen(_NO_PIECES), frozen_integers(_NO_CELLS),
+    frozen_integers(np.zeros(2, np.int64)), frozen(np.zeros(2)), frozen_integers(np.zeros(5, np.int64)),
+)  # fmt: skip

@@ -1168,3 +1168,99 @@ def time_at_feed(pieces, coefficients, feed_rate, alone, share, points=4001):
         rate = np.linalg.norm(c[1] + 2 * c[2] * s[:, None] + 3 * c[3] * s[:, None] ** 2, axis=1)
         total += np.count_nonzero(rate * (v + a * e + j * e**2 / 2) >= share * feed_rate[k]) / points * T
     return total
+
+
+# --- acceptance of the planner ---------------------------------------------------------------------
+
+
+def row_distance(toolpath, row, points, low, high):
+    """Distance of points (n,3) to one segment between two shares of it, (n,) each; arcs are arcs."""
+    start, end = toolpath.start[row, :3], toolpath.end[row, :3]
+    if toolpath.kind[row] != 2:
+        chord = end - start
+        share = np.clip((points - start) @ chord / max(chord @ chord, 1e-300), low, high)
+        return np.linalg.norm(points - start - share[:, None] * chord, axis=1)
+    best = np.full(len(points), np.inf)
+    width = high - low
+    share = low + 0.5 * width
+    for _ in range(5):  # closer and closer about the nearest of a grid
+        grid = np.clip(share[:, None] + width[:, None] * np.linspace(-0.5, 0.5, 41), low[:, None], high[:, None])
+        found = curve_points(toolpath, row, grid.ravel()).reshape(*grid.shape, 3)
+        distance = np.linalg.norm(points[:, None] - found, axis=2)
+        nearest = distance.argmin(axis=1)
+        share = grid[np.arange(len(points)), nearest]
+        best = np.minimum(best, distance.min(axis=1))
+        width = width / 20.0
+    return best
+
+
+def true_deviations(toolpath, points, at, reach):
+    """Distance of each point to the programmed lines and arcs within `reach` mm of its own place; `at` rises."""
+    distance = np.full(len(points), np.inf)
+    low, high = toolpath.arc_length[:-1], toolpath.arc_length[1:]
+    first = np.searchsorted(at, low - reach)
+    after = np.searchsorted(at, high + reach, side="right")
+    for row in np.flatnonzero((after > first) & (toolpath.kind != 6)):
+        near = slice(first[row], after[row])
+        length = max(high[row] - low[row], 1e-300)
+        begin = np.clip((at[near] - reach - low[row]) / length, 0.0, 1.0)
+        finish = np.clip((at[near] + reach - low[row]) / length, 0.0, 1.0)
+        distance[near] = np.minimum(
+            distance[near], row_distance(toolpath, row, points[near, :3], begin, finish)
+        )
+    return distance
+
+
+def end_directions(toolpath, row):
+    """Unit vectors along which a segment begins and ends, by differences."""
+    points = curve_points(toolpath, row, np.array([0.0, 1e-6, 1.0 - 1e-6, 1.0]))
+    directions = np.array([points[1] - points[0], points[3] - points[2]])
+    return directions / np.maximum(np.linalg.norm(directions, axis=1), 1e-300)[:, None]
+
+
+def rests(toolpath):
+    """Places at which a program has to rest, mm, both ends included, as it is written."""
+    needed, before, waiting = [], None, True
+    for row in range(len(toolpath)):
+        if toolpath.kind[row] == 6:
+            waiting = True
+            continue
+        travel = toolpath.arc_length[row + 1] - toolpath.arc_length[row]
+        alone = travel <= 1e-9
+        begin, finish = end_directions(toolpath, row)
+        exact = toolpath.path_mode[row] != 2
+        rest = waiting or alone
+        if before is not None and not rest:
+            direction, was_exact, was_alone = before
+            angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(direction, begin)), direction @ begin))
+            rest = was_alone or angle > 165.0 or ((exact or was_exact) and angle > 1.0)
+        if rest:
+            needed.append(toolpath.arc_length[row])
+        before, waiting = (finish, exact, alone), toolpath.path_mode[row] == 0
+    return np.array([*needed, toolpath.arc_length[-1]])
+
+
+def naive_time(toolpath, limits):
+    """Length by feed, and by the speeds of the axes on straight moves, summed; dwells included."""
+    total = toolpath.dwell.sum()
+    velocity = np.array([limit.velocity for limit in limits])
+    for row in range(len(toolpath)):
+        if toolpath.kind[row] == 6:
+            continue
+        travel = toolpath.arc_length[row + 1] - toolpath.arc_length[row]
+        change = np.abs(toolpath.end[row] - toolpath.start[row])
+        if travel <= 1e-9:
+            travel = np.linalg.norm(change[3:])
+        total += max(travel / toolpath.feed_rate[row], (change / velocity).max())
+    return total
+
+
+def path_length(path):
+    """Length of a path in XYZ, by Gauss-Legendre quadrature of ``|q'|`` over its cells."""
+    total = 0.0
+    for node, weight in zip(*np.polynomial.legendre.leggauss(8), strict=True):
+        e = (0.5 * (1.0 + node) * path.length)[:, None]
+        c = path.coefficients[:, :, :3]
+        speed = np.linalg.norm(c[:, 1] + e * (2 * c[:, 2] + 3 * e * c[:, 3]), axis=1)
+        total += 0.5 * weight * (speed * path.length).sum()
+    return total

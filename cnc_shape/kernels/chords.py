@@ -7,8 +7,8 @@ from cnc_shape.kernels import kernel
 
 ROTARY_MERGE_TOLERANCE = 1e-4  # rad
 WINDOW = 64  # edges that one chord may replace
-FEW = 4  # edges: a chord that replaces fewer is worth a look for noise
 MANY = 8  # edges: fewer are not a pattern
+STRAIGHT = 1e-6  # rad, a smaller turn is none
 NOISE_TURN = 0.1  # -, net turn over the sum of turns, of a run that is noise
 
 
@@ -61,25 +61,46 @@ def chord_reach(start, end, first, stop, tolerance):
 
 @kernel
 def turns_to_and_fro(start, end, first, after):
-    """Tell whether the turns of a run of edges cancel: their sum is below a tenth of their sizes'."""
+    """Tell whether the turns of a run of edges cancel.
+
+    At least every other one opposes the one before, and their sum is below a tenth of their sizes', or no
+    more than one of them.
+    """
     sizes = 0.0
+    largest = 0.0
+    turns = 0
+    reversals = 0
     total = np.zeros(3)
     before = np.zeros(3)
+    turn = np.zeros(3)
+    turn_before = np.zeros(3)
     for k in range(first, after):
         length = 0.0
         for i in range(3):
             length += (end[k, i] - start[k, i]) ** 2
         length = max(np.sqrt(length), 1e-300)
         size = 0.0
+        opposed = 0.0
         for i in range(3):
             tangent = (end[k, i] - start[k, i]) / length
-            if k > first:
-                size += (tangent - before[i]) ** 2
-                total[i] += tangent - before[i]
+            turn[i] = tangent - before[i]
             before[i] = tangent
+            size += turn[i] * turn[i]
+            opposed += turn[i] * turn_before[i]
+        if k == first or size < STRAIGHT * STRAIGHT:
+            continue
+        turns += 1
+        if opposed < 0.0:
+            reversals += 1
         sizes += np.sqrt(size)
+        largest = max(largest, np.sqrt(size))
+        for i in range(3):
+            total[i] += turn[i]
+            turn_before[i] = turn[i]
     net = np.sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)
-    return net <= NOISE_TURN * sizes
+    if reversals < max(2, turns // 2):
+        return False
+    return net <= max(NOISE_TURN * sizes, (1.0 + STRAIGHT) * largest)
 
 
 @kernel
@@ -87,6 +108,7 @@ def merge(start, end, tolerance, merge_tolerance, noise_tolerance, feed_rate, st
     """Greedy chords: for each edge that is kept, its first edge, the edge after it, and its distance.
 
     Edges merge only with edges of equal feed and tolerances that are `whole` moves, and never over a stop.
+    The end of a run of noise may be too short to be told from a shape: the last two chords share evenly.
     Without `final` the edges whose chord may yet grow are left for the next call.
 
     Returns
@@ -99,31 +121,46 @@ def merge(start, end, tolerance, merge_tolerance, noise_tolerance, feed_rate, st
     distance = np.empty(m)
     n = 0
     k = 0
+    run = 0  # the edge after those that may merge with k, as far as it matters
     while k < m:
-        limit = k + 1
+        run = max(run, k + 1)
         if whole[k] == 1:
             while (
-                limit < m
-                and limit - k < WINDOW
-                and stop[limit] == 0
-                and whole[limit] == 1
-                and feed_rate[limit] == feed_rate[k]
-                and tolerance[limit] == tolerance[k]
-                and merge_tolerance[limit] == merge_tolerance[k]
-                and noise_tolerance[limit] == noise_tolerance[k]
+                run < m
+                and run - k < 2 * WINDOW
+                and stop[run] == 0
+                and whole[run] == 1
+                and feed_rate[run] == feed_rate[k]
+                and tolerance[run] == tolerance[k]
+                and merge_tolerance[run] == merge_tolerance[k]
+                and noise_tolerance[run] == noise_tolerance[k]
             ):
-                limit += 1
-        if limit == m and not final and limit - k < WINDOW and whole[k] == 1:
+                run += 1
+        if run == m and not final and run - k < 2 * WINDOW and whole[k] == 1:
             break
+        limit = min(run, k + WINDOW)
         count = 1
         off = 0.0
         if limit > k + 1:
             count, off = chord_reach(start, end, k, limit, merge_tolerance[k])
-            if count < FEW and noise_tolerance[k] > merge_tolerance[k]:
+            if count < limit - k and noise_tolerance[k] > merge_tolerance[k]:
                 noise, noise_off = chord_reach(start, end, k, limit, noise_tolerance[k])
-                if noise >= MANY and turns_to_and_fro(start, end, k, k + noise):
+                if noise >= max(MANY, count + 1) and turns_to_and_fro(start, end, k, k + noise):
                     count = noise
                     off = noise_off
+                    rest = run - k - noise
+                    if 0 < rest < WINDOW:  # maybe too few to show a pattern: two chords share them
+                        half = (noise + rest) // 2
+                        tail, tail_off = chord_reach(start, end, k + half, run, noise_tolerance[k])
+                        if half + tail == noise + rest:
+                            count, off = chord_reach(start, end, k, k + half, noise_tolerance[k])
+                            first[n] = k
+                            after[n] = k + count
+                            distance[n] = off
+                            n += 1
+                            k += count
+                            count = tail
+                            off = tail_off
         first[n] = k
         after[n] = k + count
         distance[n] = off

@@ -96,6 +96,7 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease)
         if bent > 0.0:
             high = min(high, ease[2] * jerk[i] / bent)
     high = max(high, 0.0)
+    entry_high = high
     x = min(v * v + 2.0 * high * h, next_cap * next_cap)
     x = max(x, min(v, next_cap) ** 2)
     exit_v = np.sqrt(x)
@@ -106,6 +107,14 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease)
         bent = 3.0 * abs(bend[1, i]) * exit_v
         if bent > 0.0:
             high = min(high, ease[2] * jerk[i] / bent)
+    if high <= 0.0:  # too fast at its exit by this very acceleration
+        high = entry_high
+        for i in range(third.size):
+            sign = 1.0 if first[1, i] > 0.0 else -1.0
+            reach = abs(first[1, i]) + 2.0 * h * sign * bend[1, i]
+            if reach > 0.0:
+                high = min(high, (ease[1] * acceleration[i] - sign * bend[1, i] * v * v) / reach)
+        exit_v = np.sqrt(v * v + 2.0 * max(high, 0.0) * h)
     high = max(high, 0.0)
     a = min(a, high)
     steep = np.inf

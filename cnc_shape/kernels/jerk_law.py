@@ -84,34 +84,40 @@ def window_law(
 
 
 @kernel
-def joint_speed(pieces, first_piece, cap, node, cells):
+def joint_speed(pieces, first_piece, cap, node, cells, start):
     """Speed at a node where the law may be joined; -1 where it may not."""
-    if node == 0 or node == cells:
+    if node == 0:
+        return start
+    if node == cells:
         return 0.0
-    before = first_piece[node] - 1
-    after = first_piece[node]
-    if pieces[before, 4] != 0.0 or pieces[before, 5] != 0.0:
+    m = first_piece[node] - 1
+    v = pieces[m + 1, 3]
+    if pieces[m + 1, 4] != 0.0 or v > cap[node]:
         return -1.0
-    if pieces[after, 4] != 0.0 or pieces[after, 5] != 0.0 or pieces[after, 3] != pieces[before, 3]:
+    t = pieces[m, 1]
+    steepest = max(abs(pieces[m, 5]), abs(pieces[m + 1, 5]))
+    if abs(pieces[m, 4] + t * pieces[m, 5]) > NO_ACCELERATION * steepest:
         return -1.0
-    return pieces[after, 3] if pieces[after, 3] <= cap[node] else -1.0
+    if abs(pieces[m, 3] + t * (pieces[m, 4] + t * pieces[m, 5] / 2.0) - v) > SAME_SPEED * v:
+        return -1.0
+    return v
 
 
 @kernel
-def joint_before(pieces, first_piece, cap, node, cells):
+def joint_before(pieces, first_piece, cap, node, cells, start):
     """The nearest node at or before `node` where the law may be joined, and its speed there."""
     while True:
-        speed = joint_speed(pieces, first_piece, cap, node, cells)
+        speed = joint_speed(pieces, first_piece, cap, node, cells, start)
         if speed >= 0.0:
             return node, speed
         node -= 1
 
 
 @kernel
-def joint_after(pieces, first_piece, cap, node, cells):
+def joint_after(pieces, first_piece, cap, node, cells, start):
     """The nearest node at or after `node` where the law may be joined, and its speed there."""
     while True:
-        speed = joint_speed(pieces, first_piece, cap, node, cells)
+        speed = joint_speed(pieces, first_piece, cap, node, cells, start)
         if speed >= 0.0:
             return node, speed
         node += 1
@@ -119,13 +125,17 @@ def joint_after(pieces, first_piece, cap, node, cells):
 
 @kernel
 def section_law(
-    rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, tolerances,
-    most_rounds,
+    rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, entry,
+    calm_begin, calm_end, calm_speed, tolerances, most_rounds,
 ):  # fmt: skip
-    """Time law of the cells `begin` to `end`, from rest to rest.
+    """Time law of the cells `begin` to `end`, from the speed `entry` to rest.
 
     Parameters
     ----------
+    entry
+        Speed at the first node, which is passed without acceleration.
+    calm_begin, calm_end, calm_speed
+        Cells, counted from `begin`, in which the law is at most as fast as that.
     tolerances (3,)
         By which velocity and feed, acceleration and jerk may exceed their limits.
     most_rounds
@@ -135,6 +145,8 @@ def section_law(
     -------
     pieces (m,6), cell (m,)
         0, duration, place in the cell, v, a, b; the cell counted from `begin`.
+    cap (k+1,)
+        Highest speeds at the nodes.
     work
         Cells planned, over all rounds.
     found
@@ -157,13 +169,15 @@ def section_law(
     worst = np.empty((count, 7))
     top = np.empty(count)
     cap = np.empty(count + 1)
+    for k in range(calm_begin, calm_end):
+        ease[k, 0] = min(1.0, calm_speed / np.sqrt(min(limits[k, 0], limits[k, 1])))
     speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, 0, count, top, cap)
     pieces, cell = window_law(
-        size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, 0, 0.0, 0.0
+        size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, 0, entry, 0.0
     )
     work = count
     if cell.size == 0:
-        return pieces, cell, work, count
+        return pieces, cell, cap, work, count
     certificate(
         pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
         tolerances, worst,
@@ -196,8 +210,8 @@ def section_law(
             high = k
             while high < count and changed[high] == 1:
                 high += 1
-            low, start = joint_before(pieces, first_piece, cap, k, count)
-            high, finish = joint_after(pieces, first_piece, cap, high, count)
+            low, start = joint_before(pieces, first_piece, cap, k, count, entry)
+            high, finish = joint_after(pieces, first_piece, cap, high, count, entry)
             while True:
                 while made > 0 and low < windows[made - 1, 1]:
                     made -= 1
@@ -213,10 +227,11 @@ def section_law(
                 if part_cell.size > 0:
                     break
                 if low == 0 and high == count:
-                    return pieces[:0], cell[:0], work, count
+                    return pieces[:0], cell[:0], cap, work, count
                 grown = high - low
-                low, start = joint_before(pieces, first_piece, cap, max(low - grown, 0), count)
-                high, finish = joint_after(pieces, first_piece, cap, min(high + grown, count), count)
+                low, start = joint_before(pieces, first_piece, cap, max(low - grown, 0), count, entry)
+                high = min(high + grown, count)
+                high, finish = joint_after(pieces, first_piece, cap, high, count, entry)
             if filled + part_cell.size > new_cell.size:
                 new, new_cell = more_room(new, new_cell, part_cell.size)
             for m in range(part_cell.size):
@@ -243,53 +258,4 @@ def section_law(
                 alone, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
-    return pieces, cell, work, found
-
-
-@kernel
-def path_law(
-    rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, tolerances,
-    most_rounds,
-):  # fmt: skip
-    """Time law of a whole path, section by section.
-
-    Returns
-    -------
-    pieces (m,6), cell (m,)
-        0, duration, place in the cell, v, a, b.
-    stuck
-        A cell in a section without a law; -1 if there is none.
-    """
-    count = length.size
-    out = np.empty((4 * count + 64, 6))
-    out_cell = np.empty(4 * count + 64, np.int64)
-    filled = 0
-    stuck = -1
-    begin = 0
-    while begin < count:
-        if dwell[begin] > 0.0 or length[begin] == 0.0:
-            if filled == out_cell.size:
-                out, out_cell = more_room(out, out_cell, 1)
-            out[filled] = 0.0
-            out[filled, 1] = dwell[begin]
-            out_cell[filled] = begin
-            filled += 1
-        end = begin + 1
-        if length[begin] > 0.0:
-            while end < count and not stop[end] and length[end] > 0.0:
-                end += 1
-            pieces, cell, _, found = section_law(
-                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end,
-                tolerances, most_rounds,
-            )  # fmt: skip
-            if found > 0 and stuck < 0:
-                stuck = begin
-            if filled + cell.size > out_cell.size:
-                out, out_cell = more_room(out, out_cell, cell.size)
-            for n in range(cell.size):
-                for column in range(6):
-                    out[filled + n, column] = pieces[n, column]
-                out_cell[filled + n] = begin + cell[n]
-            filled += cell.size
-        begin = end
-    return out[:filled], out_cell[:filled], stuck
+    return pieces, cell, cap, work, found

@@ -135,6 +135,16 @@ def scan(
                 t = 2.0 * h / (mean + np.sqrt(mean * mean + 2.0 * entry_a * h / 3.0))
                 b = 2.0 * (limit - entry_v - entry_a * t) / (t * t)
                 a = entry_a
+                if 0.0 <= b <= steep and entry_a + b * t > high:  # a part of the rise, as steep as may be
+                    t, a = rise_to(entry_v, entry_a, steep, high, h, limit)
+                    put(phases, cell, m, t, 0.0, entry_v, entry_a, steep, k)
+                    m += 1
+                    place = moved(entry_v, entry_a, steep, t)
+                    v = entry_v + t * (entry_a + t * steep / 2.0)
+                    put(phases, cell, m, 2.0 * (h - place) / (v + limit), place, v, a, 0.0, k)
+                    m += 1
+                    v = limit
+                    continue
                 if not 0.0 <= b <= steep:
                     b = 0.0
                     a = (limit - entry_v) * (limit + entry_v) / (2.0 * h)
@@ -149,6 +159,26 @@ def scan(
                 v = limit
                 a += b * t
     return m
+
+
+@kernel
+def rise_to(v, a, steep, high, h, limit):
+    """How long the acceleration has to rise, and to what, so that after `h` the speed is `limit`."""
+    low = a
+    for _ in range(MOST_STEPS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        t = (middle - a) / steep
+        risen = v + t * (a + t * steep / 2.0)
+        left = h - moved(v, a, steep, t)
+        if left > 0.0 and risen * risen + 2.0 * middle * left < limit * limit:
+            low = middle
+        else:
+            high = middle
+    t = (low - a) / steep
+    risen = v + t * (a + t * steep / 2.0)
+    return t, (limit - risen) * (limit + risen) / (2.0 * (h - moved(v, a, steep, t)))
 
 
 @kernel
