@@ -1138,6 +1138,62 @@ def limit_use(profile, points, width, count):
     return found
 
 
+# --- when moves are passed ----------------------------------------------------------------------------
+
+
+def passing_times(rows, pieces, cells):
+    """End of every move: its own event, looked for in all of the law.
+
+    rows: (what, border, dwell); pieces: (time, duration, u, v, a, j, cell); cells: (stop, place, stretch).
+    """
+    whats = [what for what, _, _ in rows]
+    rests = [(t, T) for t, T, _, v, a, j, _ in pieces if T > 0 and v == a == j == 0]
+    turns = []  # ends of the cells in which rotary axes move alone
+    for n, (t, T, _, v, a, j, k) in enumerate(pieces):
+        if cells[k][2] == 0 and (v, a, j) != (0, 0, 0) and (n + 1 == len(pieces) or pieces[n + 1][6] != k):
+            turns.append(t + T)
+    ends = []
+    for n, (what, border, _) in enumerate(rows):
+        if what == 0:
+            ends.append(_reached(border, pieces, cells))
+        elif what == 2:
+            ends.append(turns[whats[:n].count(2)])
+        else:
+            group = n
+            while group and whats[group - 1] == 1:
+                group -= 1
+            first = sum(1 for m in range(1, group + 1) if whats[m - 1] == 1 and whats[m] != 1)
+            ends.append(rests[first][0] + sum(rows[m][2] for m in range(group, n + 1)))
+    return np.array(ends)
+
+
+def _reached(border, pieces, cells):
+    for t, T, u, v, a, j, k in pieces:
+        _, place, stretch = cells[k]
+        if stretch == 0 or v == a == j == 0:
+            continue
+        way = (border - place) / stretch - u
+        if abs(v * T + a * T**2 / 2 + j * T**3 / 6 - way) < 1e-9:
+            return t + T
+        if v * T + a * T**2 / 2 + j * T**3 / 6 > way:
+            times = np.linspace(0.0, T, 400_001)
+            return t + np.interp(way, v * times + a * times**2 / 2 + j * times**3 / 6, times)
+    raise AssertionError(border)
+
+
+def time_at_feed(pieces, coefficients, feed_rate, alone, share, points=4001):
+    """Time in which the speed is at least `share` of the feed, counted."""
+    total = 0.0
+    for _, T, u, v, a, j, k in pieces:
+        e = (np.arange(points) + 0.5) / points * T
+        s = u + v * e + a * e**2 / 2 + j * e**3 / 6
+        columns = slice(3, None) if alone[k] else slice(0, 3)
+        c = coefficients[k][:, columns]
+        rate = np.linalg.norm(c[1] + 2 * c[2] * s[:, None] + 3 * c[3] * s[:, None] ** 2, axis=1)
+        total += np.count_nonzero(rate * (v + a * e + j * e**2 / 2) >= share * feed_rate[k]) / points * T
+    return total
+
+
 # --- acceptance of the planner ---------------------------------------------------------------------
 
 
@@ -1288,4 +1344,5 @@ def time_at_feed(pieces, coefficients, feed_rate, alone, share, points=4001):
         c = coefficients[k][:, columns]
         rate = np.linalg.norm(c[1] + 2 * c[2] * s[:, None] + 3 * c[3] * s[:, None] ** 2, axis=1)
         total += np.count_nonzero(rate * (v + a * e + j * e**2 / 2) >= share * feed_rate[k]) / points * T
+
     return total
