@@ -133,6 +133,13 @@ def test_a_peak_names_its_line():
     ]  # fmt: skip
 
 
+def test_of_lines_that_use_as_much_but_for_rounding_the_first_is_named():
+    ends = [(7.0 + 0.37 * k if k % 2 else -0.11 * k, 3.0 * k, 0.1 * k) for k in range(1, 60)]
+    (x, *_) = watch([planned(toolpath(*(line(*end, feed_rate=90.0) for end in ends)), MILL)], MILL).axes
+    assert x.acceleration.share == pytest.approx(1.0)
+    assert x.acceleration.line == 1
+
+
 def test_buckets_hold_what_the_definition_says():
     """Between nine points a piece, the least that is looked at, and very many."""
     profile = planned(wander(np.random.default_rng(5), 120), GENTLE)
