@@ -29,7 +29,7 @@ from cnc_shape.motion import Block
 from cnc_shape.planning import plan, planning
 from cnc_shape.program import Motion
 from cnc_shape.report.folder import write_report
-from cnc_shape.report.limit_figures import DRAWN, limits_figure, speed_figure
+from cnc_shape.report.limit_figures import DRAWN, DRAWN_COARSE, limits_figure, speed_figure
 from cnc_shape.report.limit_table import limits_json
 from cnc_shape.report.style import render
 from cnc_shape.smoothing import Smoothing, smooth, smoothing
@@ -131,6 +131,13 @@ def test_a_peak_names_its_line():
     assert [(axis.velocity.line, round(axis.velocity.share, 6)) for axis in (x, y, z)] == [
         (1, 0.5), (4, 0.75), (5, 0.3),
     ]  # fmt: skip
+
+
+def test_of_lines_that_use_as_much_but_for_rounding_the_first_is_named():
+    ends = [(7.0 + 0.37 * k if k % 2 else -0.11 * k, 3.0 * k, 0.1 * k) for k in range(1, 60)]
+    (x, *_) = watch([planned(toolpath(*(line(*end, feed_rate=90.0) for end in ends)), MILL)], MILL).axes
+    assert x.acceleration.share == pytest.approx(1.0)
+    assert x.acceleration.line == 1
 
 
 def test_buckets_hold_what_the_definition_says():
@@ -283,6 +290,28 @@ def test_the_path_is_coloured_by_its_speed_and_rapids_are_grey():
     assert "speed of the tool (mm/s)" in texts(figure)
     assert "X (mm)" in texts(figure)
     assert "rapids are grey" in texts(figure)
+
+
+def test_a_restless_course_is_drawn_in_fewer_stretches_that_keep_the_extremes():
+    to_and_fro = [(9.0 * (k % 2), 0.5 * k, 0.0) for k in range(1, 400)]
+    use = watch([planned(toolpath(*(line(*end, feed_rate=60.0) for end in to_and_fro)), MILL)], MILL)
+    feed, acceleration, _ = limits_figure(use).axes
+    drawn = acceleration.lines[0].get_ydata()
+    assert len(drawn) <= DRAWN_COARSE
+    assert max(drawn) == pytest.approx(use.axes[0].acceleration.share, rel=1e-6)
+    mean = next(shown for shown in feed.lines if shown.get_label() == "tool, mean").get_ydata()
+    along = use.over_time
+    assert mean == pytest.approx(along.reached[-1] / (along.at[-1] + 0.5 * along.width), rel=0.05)
+
+
+def test_the_path_is_seen_from_where_its_feeds_extend_however_far_rapids_go():
+    far = toolpath(
+        {"motion": Motion.RAPID, "target": (0.0, 0.0, 90.0), "feed_rate": np.inf},
+        line(10.0, 0.0, 90.0), line(10.0, 8.0, 90.0), line(10.0, 8.0, 88.0),
+    )  # fmt: skip
+    said = texts(speed_figure(watch([planned(far, MILL)], MILL)))
+    assert "X (mm)" in said
+    assert "Y (mm)" in said
 
 
 def test_a_long_path_becomes_a_picture_in_the_figure():

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DRAWN = 1024  # stretches of a line
+DRAWN_COARSE = 128  # of one that goes up and down too often to be followed
+RESTLESS = 0.12  # -, mean change from stretch to stretch, beyond which a line is drawn coarsely
 HEADROOM = 1.12  # -, of the highest use that is drawn
 LIMIT: dict[str, Any] = {"color": "black", "linewidth": 0.8, "linestyle": (0, (4.0, 2.0))}
 PROGRAMMED: dict[str, Any] = {"color": "black", "linewidth": 0.9}
@@ -26,14 +28,13 @@ RAPID: dict[str, Any] = {"color": PATH_COLOUR, "linewidth": 0.6, "alpha": 0.7}
 PATH_WIDTH = 1.3  # point
 TALLEST = 0.8  # -, height of a path's picture to its width
 WIDE = 0.1  # -, of the highest speed, between slowest and fastest: their mean is drawn as well
-MEAN_OF = 8  # stretches
 VECTORS = 1_000  # segments of a path that are drawn as such; more become a picture
 
 
 @styled
 def limits_figure(use: LimitUse, *, along_path: bool = False) -> Figure:
     """Feed, and the use of every axis's acceleration and jerk, over time or along the path."""
-    course = _thinned(use.along_path if along_path else use.over_time)
+    course = _drawable(use.along_path if along_path else use.over_time)
     figure, (feed, acceleration, jerk) = new_figure(WIDTH, 5.6, 3, 1, sharex=True)
     bounded = [axis.jerk is not None for axis in use.axes]
     _draw_feed(feed, course, along_path=along_path)
@@ -57,19 +58,20 @@ def limits_figure(use: LimitUse, *, along_path: bool = False) -> Figure:
 
 @styled
 def speed_figure(use: LimitUse) -> Figure:
-    """The planned path, coloured by the speed of the tool; rapids are grey."""
+    """The planned path, coloured by the speed of the tool, from where it shows most; rapids are grey."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
 
+    ruled = ~use.rapid
+    coloured = ruled if ruled.any() else use.rapid
+    shown = np.ptp(use.path[:-1][coloured], axis=0)
+    i, j = sorted(np.argsort(-shown, kind="stable")[:2].tolist())
     spread = np.ptp(use.path, axis=0)
-    i, j = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
     slope = min(spread[j] / max(spread[i], 1e-9), TALLEST)
     lying = slope < 0.45
     figure, (ax,) = new_figure(WIDTH, slope * (WIDTH - (1.0 if lying else 2.0)) + (1.7 if lying else 0.8))
     figure.set_layout_engine("compressed")
     segments = np.stack([use.path[:-1, [i, j]], use.path[1:, [i, j]]], axis=1)
-    ruled = ~use.rapid
-    coloured = ruled if ruled.any() else use.rapid
     style: dict[str, Any] = {"rasterized": len(segments) > VECTORS, "capstyle": "round"}
     ax.add_collection(LineCollection(list(segments[~coloured]), **style, **RAPID))
     lines = LineCollection(list(segments[coloured]), linewidth=PATH_WIDTH, cmap=SPEED_COLOURS, **style)
@@ -89,9 +91,21 @@ def speed_figure(use: LimitUse) -> Figure:
     return figure
 
 
-def _thinned(course: Course) -> Course:
-    """At most `DRAWN` buckets: of several neighbours the extremes."""
-    group = ceil(course.fastest.size / DRAWN)
+def _drawable(course: Course) -> Course:
+    """The course in at most `DRAWN` stretches, in fewer where lines would run into each other."""
+    fine = _thinned(course, DRAWN)
+    speed = fine.fastest[:, None] / max(float(np.nanmax(fine.fastest)), 1e-9)
+    changes = (
+        np.nan_to_num(np.abs(np.diff(values, axis=0))).mean(axis=0).max(initial=0.0)
+        for values in (speed, fine.acceleration, fine.jerk)
+        if len(values) > 1
+    )
+    return _thinned(course, DRAWN_COARSE) if max(changes, default=0.0) > RESTLESS else fine
+
+
+def _thinned(course: Course, drawn: int) -> Course:
+    """At most `drawn` buckets: of several neighbours the extremes."""
+    group = ceil(course.fastest.size / drawn)
     if group == 1:
         return course
     return Course(
@@ -132,11 +146,12 @@ def _draw_feed(ax: Axes, course: Course, *, along_path: bool) -> None:
 
 def _means(course: Course, *, along_path: bool) -> tuple[FloatArray, FloatArray]:
     """Middles of longer stretches, and the mean speed in each."""
-    ends = np.arange(1, course.reached.size // MEAN_OF + 1) * MEAN_OF
+    group = ceil(course.reached.size / DRAWN_COARSE)
+    ends = np.arange(1, course.reached.size // group) * group  # the last may be cut short
     reached = np.maximum.accumulate(np.nan_to_num(course.reached))[ends - 1]
-    gone, width = np.diff(reached, prepend=0.0), MEAN_OF * course.width
+    gone, width = np.diff(reached, prepend=0.0), group * course.width
     means = width / np.maximum(gone, 1e-12) if along_path else gone / width
-    return frozen((ends - 0.5 * MEAN_OF) * course.width), means
+    return frozen((ends - 0.5 * group) * course.width), means
 
 
 def _draw_share(ax: Axes, use: LimitUse, course: Course, drawn: Sequence[bool], values: FloatArray) -> None:
