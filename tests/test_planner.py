@@ -1,5 +1,7 @@
 """The planner as its users meet it: the numbers of the specification, hostile paths, real programs."""
 
+from itertools import pairwise
+
 import naive
 import numpy as np
 import pytest
@@ -51,7 +53,7 @@ def in_blocks(points, size):
     """The same corners, in blocks of about `size`."""
     points = np.asarray(points, dtype=float)
     parts = [points[:1]]
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         count = max(1, round(np.linalg.norm(b - a) / size))
         parts.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
     return np.vstack(parts)
