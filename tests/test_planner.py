@@ -1,5 +1,7 @@
 """The planner as its users meet it: the numbers of the specification, hostile paths, real programs."""
 
+from itertools import pairwise
+
 import naive
 import numpy as np
 import pytest
@@ -51,7 +53,7 @@ def in_blocks(points, size):
     """The same corners, in blocks of about `size`."""
     points = np.asarray(points, dtype=float)
     parts = [points[:1]]
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         count = max(1, round(np.linalg.norm(b - a) / size))
         parts.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
     return np.vstack(parts)
@@ -223,9 +225,9 @@ def test_tangent_lines_and_arcs_run_through(limits):
     assert speed.min() >= (floor if limits is MILL else 0.25 * floor)
 
 
-@pytest.mark.parametrize(("limits", "most"), [(MILL, 1.0), (MILL_J, 2.6)], ids=["no jerk", "jerk"])
+@pytest.mark.parametrize(("limits", "most"), [(MILL, 1e-3), (MILL_J, 0.15)], ids=["no jerk", "jerk"])
 def test_an_exact_path_runs_through_tangent_joints_by_one_micrometre(limits, most):
-    """What G61 costs: the transition of curvature has 1 um. With a jerk limit that is much."""
+    """What G61 costs: nothing without a jerk limit; with one 1.84 s, blended 1.62 s, at rest in each joint 2.16 s."""
     exact, blend = (tangent_path(mode) for mode in (PathMode.EXACT_PATH, PathMode.BLEND))
     path = smooth(exact, Smoothing(0.01))
     profile = plan(path, limits)
@@ -234,6 +236,8 @@ def test_an_exact_path_runs_through_tangent_joints_by_one_micrometre(limits, mos
     assert path.stop.sum() == 2
     ratio = profile.end_time / plan(smooth(blend, Smoothing(0.01)), limits).end_time
     assert 1.0 - 1e-3 <= ratio <= 1.0 + most
+    resting = plan(smooth(tangent_path(PathMode.EXACT_STOP), Smoothing(0.01)), limits)
+    assert profile.end_time < 0.92 * resting.end_time
 
 
 def test_an_exact_path_passes_every_corner_exactly_and_rests_there():
@@ -325,6 +329,10 @@ def test_hostile_paths_keep_tolerance_and_limits_and_do_not_rest(make, seed, tol
     profile = plan(path, limits)
     assert_keeps(profile, limits, 9)
     assert_runs_through(profile)
+    limits = machine("mill", len(whole.axes), jerk=True)
+    jerk_limited = plan(path, limits)
+    assert_keeps(jerk_limited, limits, 33)
+    assert profile.end_time <= jerk_limited.end_time * (1 + 1e-4)
 
 
 # --- real programs -----------------------------------------------------------------------------------

@@ -190,3 +190,40 @@ def test_chunks_do_not_change_the_polyline(sizes):
     streamed, once = join(parts), straighten(whole)
     for name in Polyline.__slots__:
         assert_array_equal(getattr(streamed, name), getattr(once, name), err_msg=name)
+
+
+def zigzag(legs, blocks_per_leg=1):
+    corners = np.column_stack([0.02 * np.arange(legs + 1), 0.004 * (np.arange(legs + 1) % 2)])
+    steps = np.arange(legs * blocks_per_leg + 1) / blocks_per_leg
+    return np.column_stack([np.interp(steps, np.arange(legs + 1), column) for column in corners.T])
+
+
+@pytest.mark.parametrize("legs", [65, 66, 73, 128, 129, 200, 1000])
+@pytest.mark.parametrize("blocks_per_leg", [1, 4])
+def test_noise_is_merged_to_its_end(legs, blocks_per_leg):
+    """The last two chords share evenly: none is too short to show that its edges turn to and fro."""
+    edges = straighten(lines(zigzag(legs, blocks_per_leg)))
+    assert len(edges) - 1 == -(-legs * blocks_per_leg // WINDOW)
+    assert edges.travel[:-1].min() >= 0.4 * edges.travel[:-1].max()
+
+
+@pytest.mark.parametrize("sizes", [[1], [3, 0, 50], [64]])
+def test_chunks_do_not_change_the_end_of_noise(sizes):
+    feeds = np.repeat([40.0, 90.0], [150, 141])
+    whole = lines(zigzag(291), feeds)
+    step, state, parts = polyline(MERGING), None, []
+    cut = chunks(whole, sizes)
+    for number, part in enumerate(cut, 1):
+        state, edges = step(state, part, number == len(cut))
+        parts.append(edges)
+    streamed, once = join(parts), straighten(whole)
+    for name in Polyline.__slots__:
+        assert_array_equal(getattr(streamed, name), getattr(once, name), err_msg=name)
+
+
+def test_a_smooth_curve_that_turns_both_ways_is_not_noise():
+    """Where it changes its side, its turns cancel, but not to and fro."""
+    x = 0.02 * np.arange(400)
+    wave = np.column_stack([x, 0.3 * np.sin(x)])
+    kept = straighten(lines(wave))
+    assert len(kept) == len(straighten(lines(wave), Merging(0.01, 0.1, 0.1)))
