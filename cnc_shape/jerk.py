@@ -25,6 +25,7 @@ from cnc_shape.smoothing import Path, join_paths
 RISE_TIME = 1e-6  # s, in which an axis without jerk limit reaches its acceleration
 TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
 MOST_ROUNDS = 100  # of lowering the limits of cells
+MOST_REFINED = 1_000_000  # cells between two stops whose law is brought close to the fastest one
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,7 +69,7 @@ def jerk_planning(
         limit_v2, straight = speed_limits(asked, done.length, feed_rate, alone, velocity, acceleration)
         pieces, cell, stuck = path_law(
             asked, done.length, done.stop, done.dwell, feed_rate, alone, limit_v2, straight, velocity,
-            acceleration, jerk, TOLERANCES, MOST_ROUNDS,
+            acceleration, jerk, TOLERANCES, MOST_ROUNDS, MOST_REFINED,
         )  # fmt: skip
         if stuck >= 0:
             raise InfeasibleError("no time law keeps the jerk limit here", line=int(done.line[stuck]))

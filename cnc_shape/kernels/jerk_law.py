@@ -18,6 +18,7 @@ from cnc_shape.kernels.jerk_certificate import certificate
 from cnc_shape.kernels.jerk_phases import moved
 from cnc_shape.kernels.jerk_pieces import NEAR, cut, index_pieces, more_room, spliced
 from cnc_shape.kernels.jerk_rounding import round_off
+from cnc_shape.kernels.jerk_refine import refined
 from cnc_shape.kernels.jerk_scan import PHASES, envelope, mirrored, scan
 
 NO_ACCELERATION = 1e-9  # s, times the jerk: as good as none
@@ -120,7 +121,7 @@ def joint_after(pieces, first_piece, cap, node, cells):
 @kernel
 def section_law(
     rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, tolerances,
-    most_rounds,
+    most_rounds, most_refined,
 ):  # fmt: skip
     """Time law of the cells `begin` to `end`, from rest to rest.
 
@@ -130,6 +131,8 @@ def section_law(
         By which velocity and feed, acceleration and jerk may exceed their limits.
     most_rounds
         Of lowering limits where they do not.
+    most_refined
+        Cells of a section that is worth to be brought close to the fastest law.
 
     Returns
     -------
@@ -243,13 +246,18 @@ def section_law(
                 alone, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
+    if found == 0 and count <= most_refined:
+        pieces, cell = refined(
+            pieces, cell, rows[begin:end], size, feed_rate[begin:end], alone[begin:end], limits, straight_a,
+            velocity, acceleration, jerk, tolerances,
+        )  # fmt: skip
     return pieces, cell, work, found
 
 
 @kernel
 def path_law(
     rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, tolerances,
-    most_rounds,
+    most_rounds, most_refined,
 ):  # fmt: skip
     """Time law of a whole path, section by section.
 
@@ -280,7 +288,7 @@ def path_law(
                 end += 1
             pieces, cell, _, found = section_law(
                 rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end,
-                tolerances, most_rounds,
+                tolerances, most_rounds, most_refined,
             )  # fmt: skip
             if found > 0 and stuck < 0:
                 stuck = begin
