@@ -119,7 +119,19 @@ def gaps(path: Path):
 
 def refined(path: Path, parts: int) -> Path:
     """The same path with every cell but the rests cut into equal ones."""
-    count = np.where(path.length > 0.0, parts, 1)
+    return cut_cells(path, np.where(path.length > 0.0, parts, 1))
+
+
+def divided(path: Path, cells: int) -> Path:
+    """The same path in about as many `cells`: none is longer than their mean, none whole but the rests."""
+    return cut_cells(
+        path, np.where(path.length > 0.0, 1 + np.ceil(path.length * cells / path.length.sum()), 1)
+    )
+
+
+def cut_cells(path: Path, count: np.ndarray) -> Path:
+    """The same path with each cell cut into as many equal ones."""
+    count = count.astype(np.int64)
     k = np.repeat(np.arange(len(path)), count)
     share = np.concatenate([np.arange(n) / n for n in count])
     e, c = (share * path.length[k])[:, None], path.coefficients[k]

@@ -17,6 +17,7 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_law import NO_ACCELERATION, section_law
 from cnc_shape.kernels.jerk_pieces import index_pieces, more_room
+from cnc_shape.kernels.jerk_refine import close_to_fastest
 from cnc_shape.kernels.jerk_rescue import slow_law
 
 SAME_CAP = 1e-9  # -, of a speed that is the node's own cap
@@ -124,18 +125,15 @@ def calm_cells(rows, length, limit_v2, acceleration, jerk, pieces, cell, begin, 
 
 
 @kernel
-def released(pieces, cell, until, at, out, out_cell, filled):
-    """Append the pieces of the cells before `until`; returns the arrays and how many they hold."""
-    count = 0
-    while count < cell.size and cell[count] < until:
-        count += 1
-    if filled + count > out_cell.size:
-        out, out_cell = more_room(out, out_cell, count)
-    for n in range(count):
+def released(pieces, cell, at, out, out_cell, filled):
+    """Append pieces; returns the arrays and how many they hold."""
+    if filled + cell.size > out_cell.size:
+        out, out_cell = more_room(out, out_cell, cell.size)
+    for n in range(cell.size):
         for column in range(6):
             out[filled + n, column] = pieces[n, column]
         out_cell[filled + n] = at + cell[n]
-    return out, out_cell, filled + count
+    return out, out_cell, filled + cell.size
 
 
 @kernel
@@ -205,7 +203,11 @@ def windows_law(
         )  # fmt: skip
         counts[PLANNED] += work
         if found == 0 and marks[0] > 0:
-            out, out_cell, filled = released(held, held_cell, marks[0], at, out, out_cell, filled)
+            held, held_cell = close_to_fastest(
+                held, held_cell, marks[0], rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
+                acceleration, jerk, at, tolerances,
+            )  # fmt: skip
+            out, out_cell, filled = released(held, held_cell, at, out, out_cell, filled)
             at = begin
         elif found > 0 and marks[0] > 0:
             counts[MERGED] += 1
@@ -217,7 +219,11 @@ def windows_law(
             counts[PLANNED] += work
             if found > 0:
                 counts[RESTS] += 1
-                out, out_cell, filled = released(held, held_cell, marks[1], at, out, out_cell, filled)
+                held, held_cell = close_to_fastest(
+                    held, held_cell, marks[1], rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
+                    acceleration, jerk, at, tolerances,
+                )  # fmt: skip
+                out, out_cell, filled = released(held, held_cell, at, out, out_cell, filled)
                 at += marks[1]
                 marks[0] = 0
                 continue
@@ -237,7 +243,11 @@ def windows_law(
         most = count
         marks[0] = 0
         if rests:
-            out, out_cell, filled = released(pieces, cell, end - at, at, out, out_cell, filled)
+            pieces, cell = close_to_fastest(
+                pieces, cell, end - at, rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
+                acceleration, jerk, at, tolerances,
+            )  # fmt: skip
+            out, out_cell, filled = released(pieces, cell, at, out, out_cell, filled)
             at = end
             continue
         joint, speed = last_joint(pieces, cell, cap, end - at)
@@ -264,7 +274,11 @@ def windows_law(
                     cell = calmed_cell
         if joint == 0:
             counts[RESTS] += 1
-            out, out_cell, filled = released(pieces, cell, end - at, at, out, out_cell, filled)
+            pieces, cell = close_to_fastest(
+                pieces, cell, end - at, rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
+                acceleration, jerk, at, tolerances,
+            )  # fmt: skip
+            out, out_cell, filled = released(pieces, cell, at, out, out_cell, filled)
             at = end
             continue
         held = pieces

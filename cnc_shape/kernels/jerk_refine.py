@@ -1,0 +1,280 @@
+"""A finished law brought close to the fastest one, window by window.
+
+The scans of `kernels/jerk_scan.py` run curves as if the path acceleration were 0 wherever a limit of speed is
+met, and what the jerk of a curve takes they leave to guesses that only ever get lower. In a blend the fastest
+law brakes until its middle and accelerates from there, because then ``3 q'' v a`` takes ``q''' v^3`` away; it
+is found by `kernels/jerk_interior.py`, between two points of the law where speed and acceleration stay what
+they are. What comes out is certified like the law itself, and taken only where it keeps the limits and is
+faster: no law gets slower.
+"""
+# pyright: basic
+
+import numpy as np
+
+from cnc_shape.kernels import kernel
+from cnc_shape.kernels.jerk_caps import derivatives, straight_jerk
+from cnc_shape.kernels.jerk_certificate import certificate
+from cnc_shape.kernels.jerk_interior import interior
+from cnc_shape.kernels.jerk_phases import moved
+from cnc_shape.kernels.jerk_spline import LEAST_NODES, limit_rows, spline, spline_phases, window_nodes
+
+STEP = 0.2  # -, of the time in which the acceleration rises: longest time between nodes
+LEAST_STEPS = 1.0 / 500.0  # -, of the time of a window
+LONG_CRUISE = 2.0  # -, of the time in which the acceleration rises: windows end in such a phase
+MOST_PIECES = 1500  # of a window
+SHORTEST_CELL = 1e-7  # mm or rad, between nodes
+ROOM_ACCELERATION = 1.0 - 1e-3  # -, of the limits that the law between its nodes may use
+ROOM_JERK = 1.0 - 4e-3
+ROOM_SPEED_V2 = 1.0 - 4e-4
+WIDE = 1.002  # -, of them at the ends of a window, where the law is given
+NEAR_ENDS = 8  # segments over which the room becomes less
+MOST_TRIES = 6
+WORTH = 1e-6  # -, of its time by which a window must get shorter
+
+
+@kernel
+def rise_time(acceleration, jerk):
+    """Longest time in which an axis reaches its acceleration."""
+    longest = 0.0
+    for i in range(jerk.size):
+        longest = max(longest, acceleration[i] / jerk[i])
+    return longest
+
+
+@kernel
+def window_end(pieces, cell, straight_a, begin, rise):
+    """Last piece of the window that starts in `begin`, and whether a cell of it is curved."""
+    curved = False
+    m = begin
+    while True:
+        curved = curved or straight_a[cell[m]] == 0.0
+        cruise = pieces[m, 4] == 0.0 and pieces[m, 5] == 0.0 and pieces[m, 1] > LONG_CRUISE * rise
+        if m + 1 == cell.size or (m > begin and (cruise or m - begin > MOST_PIECES)):
+            return m, curved
+        m += 1
+
+
+@kernel
+def less_room(worst, at_cell, tolerances, room, cap):
+    """Lower the room of segments in whose cells too much was asked for; returns how many."""
+    n = at_cell.size
+    d = room.shape[1] // 2
+    found = 0
+    for s in range(n):
+        fast = 0.0
+        pushed = 0.0
+        jerked = 0.0
+        for k in range(max(s - 2, 0), min(s + 2, n - 1)):
+            own = worst[at_cell[k]]
+            fast = max(fast, max(own[0], own[2]))
+            pushed = max(pushed, own[1])
+            jerked = max(jerked, max(own[3], max(own[4], own[5])))
+        if fast > 1.0 + tolerances[0]:
+            for p in range(4):
+                cap[s, p] *= (1.0 - 1e-5) / (fast * fast)
+            found += 1
+        if pushed > 1.0 + tolerances[1]:
+            for i in range(d):
+                room[s, i] *= (1.0 - 1e-5) / pushed
+            found += 1
+        if jerked > 1.0 + tolerances[2]:
+            for i in range(d):
+                room[s, d + i] /= jerked
+            found += 1
+    return found
+
+
+@kernel
+def peaks(pieces, cell, worst):
+    """Raise the ratios of velocity and feed by what speeds within pieces exceed those at their ends."""
+    for m in range(cell.size):
+        v = pieces[m, 3]
+        a = pieces[m, 4]
+        b = pieces[m, 5]
+        end_a = a + b * pieces[m, 1]
+        if a > 0.0 and end_a < 0.0:
+            most = v - 0.5 * a * a / b
+            end_v = v + 0.5 * (a + end_a) * pieces[m, 1]
+            for n in (0, 2):
+                worst[cell[m], n] *= most / max(v, end_v)
+
+
+@kernel
+def refined_window(
+    pieces, cell, begin, start, end, finish, rise, rows, length, feed_rate, alone, limit_v2, straight_a,
+    velocity, acceleration, jerk, tolerances,
+):  # fmt: skip
+    """Pieces of a faster law between two points of a law; no pieces if there is none."""
+    d = acceleration.size
+    none = np.empty((0, 6))
+    no_cell = np.empty(0, np.int64)
+    time = 0.0
+    for m in range(begin, end + 1):
+        time += (finish if m == end else pieces[m, 1]) - (start if m == begin else 0.0)
+    step = max(STEP * rise, LEAST_STEPS * time)
+    most = int(time / step) + 2 * (end - begin) + 8
+    at = np.empty(most)
+    at_cell = np.empty(most, np.int64)
+    law = np.empty((most, 3))
+    n = window_nodes(pieces, cell, begin, start, end, finish, step, at, at_cell, law)
+    if n < LEAST_NODES:
+        return none, no_cell
+    at = at[:n].copy()
+    at_cell = at_cell[:n].copy()
+    place = np.empty(n)
+    border = np.empty(n + 1)
+    centre = np.empty(n + 2)
+    c = np.empty(n + 2)
+    spline(at, at_cell, law[:n].copy(), length, place, border, centre, c)
+    for k in range(1, n):
+        if not place[k] - place[k - 1] > SHORTEST_CELL:
+            return none, no_cell
+    for k in range(n + 2):
+        if not c[k] > 0.0:
+            return none, no_cell
+    value = np.empty((n, 4, 3))
+    row = np.empty((n, 4, 2 * d, 3))
+    cap = np.empty((n, 4))
+    limit_rows(
+        place, border, centre, at, at_cell, rows, straight_a, limit_v2, acceleration, jerk, value, row, cap
+    )
+    room = np.empty((n, 2 * d))
+    for s in range(n):
+        near = min(1.0, min(s, n - 1 - s) / NEAR_ENDS)
+        wide = WIDE if near == 0.0 else 1.0
+        for i in range(d):
+            room[s, i] = wide * (1.0 - near * (1.0 - ROOM_ACCELERATION))
+            room[s, d + i] = wide * (1.0 - near * (1.0 - ROOM_JERK))
+        for p in range(4):
+            cap[s, p] *= wide * (1.0 - near * (1.0 - ROOM_SPEED_V2))
+    share = np.empty((n, 4))
+    slack = np.empty((n, 4, 1 + 4 * d))
+    price = np.empty((n, 4, 1 + 4 * d))
+    more_slack = np.empty((n, 4, 1 + 4 * d))
+    more_price = np.empty((n, 4, 1 + 4 * d))
+    new = np.empty((2 * n, 6))
+    new_cell = np.empty(2 * n, np.int64)
+    worst = np.empty((straight_a.size, 7))
+    curved = np.zeros(straight_a.size)
+    for _ in range(MOST_TRIES):
+        if not interior(c, border, value, row, cap, room, share, slack, price, more_slack, more_price):
+            return none, no_cell
+        if not spline_phases(c, place, border, centre, at, at_cell, new, new_cell):
+            return none, no_cell
+        shorter = 0.0
+        for m in range(2 * n):
+            shorter += new[m, 1]
+        if not shorter < time * (1.0 - WORTH):
+            return none, no_cell
+        certificate(
+            new, new_cell, 0, 2 * n, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
+            tolerances, worst,
+        )  # fmt: skip
+        peaks(new, new_cell, worst)
+        if less_room(worst, at_cell, tolerances, room, cap) == 0:
+            return new, new_cell
+    return none, no_cell
+
+
+@kernel
+def refined(
+    pieces, cell, rows, length, feed_rate, alone, limit_v2, straight_a, velocity, acceleration, jerk, tolerances
+):
+    """Pieces (m,6) of a law from rest to rest and their cells, where it could be made faster."""
+    rise = rise_time(acceleration, jerk)
+    size = cell.size
+    out = np.empty((2 * size + 64, 6))
+    out_cell = np.empty(2 * size + 64, np.int64)
+    filled = 0
+    begin = 0
+    done = 0.0  # of the piece `begin`
+    while begin < size:
+        end, curved = window_end(pieces, cell, straight_a, begin, rise)
+        last = end + 1 == size
+        start = 0.5 * pieces[begin, 1] if begin == 0 else max(done, pieces[begin, 1] - rise)
+        if begin > 0 and start >= pieces[begin, 1]:
+            start = done
+        finish = 0.5 * pieces[end, 1]
+        if not last:
+            finish = min(finish, rise)
+        new = np.empty((0, 6))
+        new_cell = np.empty(0, np.int64)
+        if curved and end > begin:
+            new, new_cell = refined_window(
+                pieces, cell, begin, start, end, finish, rise, rows, length, feed_rate, alone, limit_v2,
+                straight_a, velocity, acceleration, jerk, tolerances,
+            )  # fmt: skip
+        needed = filled + new_cell.size + (end - begin) + 4
+        if needed > out_cell.size:
+            more = np.empty((2 * needed, 6))
+            more_cell = np.empty(2 * needed, np.int64)
+            more[:filled] = out[:filled]
+            more_cell[:filled] = out_cell[:filled]
+            out = more
+            out_cell = more_cell
+        if new_cell.size == 0:
+            for m in range(begin, end + 1):
+                low = done if m == begin else 0.0
+                high = pieces[m, 1] if m < end or last else finish
+                filled = put_part(pieces, cell, m, low, high, out, out_cell, filled)
+        else:
+            filled = put_part(pieces, cell, begin, done, start, out, out_cell, filled)
+            for m in range(new_cell.size):
+                out[filled] = new[m]
+                out_cell[filled] = new_cell[m]
+                filled += 1
+            if last:
+                filled = put_part(pieces, cell, end, finish, pieces[end, 1], out, out_cell, filled)
+        begin = size if last else end
+        done = finish
+    return out[:filled].copy(), out_cell[:filled].copy()
+
+
+@kernel
+def put_part(pieces, cell, m, low, high, out, out_cell, filled):
+    """Write a piece between two of its times; returns the number of pieces then."""
+    if not high > low and pieces[m, 1] > 0.0:
+        return filled
+    v = pieces[m, 3]
+    a = pieces[m, 4]
+    b = pieces[m, 5]
+    out[filled, 0] = 0.0
+    out[filled, 1] = high - low
+    out[filled, 2] = pieces[m, 2] + moved(v, a, b, low) if low > 0.0 else pieces[m, 2]
+    out[filled, 3] = v + low * (a + low * b / 2.0)
+    out[filled, 4] = a + b * low
+    out[filled, 5] = b
+    out_cell[filled] = cell[m]
+    return filled + 1
+
+
+@kernel
+def close_to_fastest(
+    pieces, cell, until, rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration,
+    jerk, at, tolerances,
+):  # fmt: skip
+    """The pieces of the cells before `until` of a law, faster where they can be; cells count from `at`.
+
+    Where the acceleration along the path is limited (`along`), the law stays what it is.
+    """
+    count = 0
+    while count < cell.size and cell[count] < until:
+        count += 1
+    law = pieces[:count].copy()
+    law_cell = cell[:count].copy()
+    if along.size > 0 or count == 0:
+        return law, law_cell
+    d = acceleration.size
+    size = length[at : at + until].copy()
+    first = np.empty((until, 2, d))
+    bend = np.empty((until, 2, d))
+    third = np.empty((until, d))
+    derivatives(rows[at : at + until], size, first, bend, third)
+    straight_a = np.empty(until)
+    straight_b = np.empty(until)
+    limits = limit_v2[at : at + until]
+    straight_jerk(limits, straight[at : at + until], first, bend, third, jerk, straight_a, straight_b)
+    return refined(
+        law, law_cell, rows[at : at + until], size, feed_rate[at : at + until], alone[at : at + until], limits,
+        straight_a, velocity, acceleration, jerk, tolerances,
+    )  # fmt: skip
