@@ -5,12 +5,13 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo papers test lint bench clean
+.PHONY: help demo papers test slow lint bench clean
 
 help:
 	@echo "make demo    simulate the bundled sample and write its report"
 	@echo "make papers  run the papers again: docs/papers, their pages and figures"
-	@echo "make test    run the whole test suite"
+	@echo "make test    run the test suite, but for its slow lane"
+	@echo "make slow    run the slow lane: long real programs"
 	@echo "make lint    ruff, pyright, import-linter"
 	@echo "make bench   measure against named peers"
 	@echo "make clean   remove the virtual environment and what runs left behind"
@@ -41,6 +42,9 @@ papers: $(VENV)/.run
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+slow: $(VENV)/.test
+	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

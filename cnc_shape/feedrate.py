@@ -18,7 +18,7 @@ import numpy as np
 from cnc_shape.arrays import BoolArray, FloatArray, IntArray, frozen, frozen_integers
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.kernels.path_limits import chord_speeds, straight_along
-from cnc_shape.kernels.speed_limits import speed_limits
+from cnc_shape.kernels.speed_limits import almost_straight, speed_limits
 from cnc_shape.kernels.time_law import backward, forward
 from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
 from cnc_shape.smoothing import Path, join_paths
@@ -97,9 +97,11 @@ def scanning(
         limit_v2, straight = speed_limits(
             asked, whole.length, feed_rate, rotary_only(whole), velocity, acceleration
         )
-        along = _along(whole, path_limits)
+        along = accelerations_along(whole, path_limits)
         if along.size:
             straight = straight_along(asked, straight, along)
+        else:
+            limit_v2, straight = almost_straight(asked, whole.length, limit_v2, straight, acceleration)
         reach_v2, free = backward(
             asked, whole.length, whole.stop, limit_v2, straight, acceleration, along, before.before_v2
         )
@@ -163,8 +165,8 @@ def chord_feed_rate(path: Path, path_limits: PathLimits) -> FloatArray:
     )
 
 
-def _along(path: Path, path_limits: PathLimits) -> FloatArray:
-    """Limit of the acceleration along each cell, (k,) mm/s^2; (0,) where there is none."""
+def accelerations_along(path: Path, path_limits: PathLimits) -> FloatArray:
+    """Return the limit of the acceleration along each cell, (k,) mm/s^2; (0,) where there is none."""
     if np.isinf(path_limits.acceleration):
         return frozen(np.empty(0))
     return frozen(np.where(path.stretch == 0.0, np.inf, path_limits.acceleration))

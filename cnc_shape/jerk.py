@@ -14,9 +14,17 @@ from typing import TypeAlias
 import numpy as np
 
 from cnc_shape.arrays import FloatArray, IntArray, frozen, frozen_integers
-from cnc_shape.feedrate import Profile, check_executable, chord_feed_rate, gentle, rotary_only
+from cnc_shape.feedrate import (
+    Profile,
+    accelerations_along,
+    check_executable,
+    chord_feed_rate,
+    gentle,
+    rotary_only,
+)
 from cnc_shape.kernels.jerk_pieces import timed
 from cnc_shape.kernels.jerk_windows import windows_law
+from cnc_shape.kernels.path_limits import straight_along
 from cnc_shape.kernels.speed_limits import speed_limits
 from cnc_shape.limits import NO_PATH_LIMITS, Limits, PathLimits
 from cnc_shape.smoothing import Path, join_paths
@@ -25,6 +33,7 @@ RISE_TIME = 1e-6  # s, in which an axis without jerk limit reaches its accelerat
 TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
 MOST_ROUNDS = 100  # of lowering the limits of cells
 WINDOW, LOOK_AHEAD = 4096, 4.0  # cells and stopping distances that are planned at once, at least
+MOST_PARTS = 64  # that wait without being joined
 PATIENCE = 1024  # cells that gather before a new attempt
 
 
@@ -67,6 +76,8 @@ def jerk_planning(
         check_executable(path, (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk)))
         before = state or _START
         parts = (*before.parts, path) if len(path) else before.parts
+        if len(parts) > MOST_PARTS:
+            parts = (join_paths(parts),)
         gathered = sum(len(part) for part in parts)
         if gathered == 0 or (not last and gathered < before.patience):
             waiting = None if last else replace(before, parts=parts)
@@ -76,10 +87,13 @@ def jerk_planning(
         alone, clock = rotary_only(whole), before.clock.copy()
         marks, speeds, counts = before.marks.copy(), before.speeds.copy(), before.counts.copy()
         limit_v2, straight = speed_limits(asked, whole.length, feed_rate, alone, velocity, acceleration)
+        along = accelerations_along(whole, path_limits)
+        if along.size:
+            straight = straight_along(asked, straight, along)
         pieces, cell, held, held_cell, final = windows_law(
-            asked, whole.length, whole.stop, whole.dwell, feed_rate, alone, limit_v2, straight, velocity,
-            acceleration, jerk, TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD, before.held.copy(),
-            before.held_cell.copy(), marks, speeds, counts,
+            asked, whole.length, whole.stop, whole.dwell, feed_rate, alone, limit_v2, straight, along,
+            velocity, acceleration, jerk, TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD,
+            before.held.copy(), before.held_cell.copy(), marks, speeds, counts,
         )  # fmt: skip
         timed(pieces, clock)
         profile = _profile(whole.cut(slice(0, final)), pieces, cell)

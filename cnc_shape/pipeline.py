@@ -32,6 +32,7 @@ from cnc_shape.errors import InfeasibleError
 from cnc_shape.joints import CARTESIAN, joints_of
 from cnc_shape.kernels.sums import add_squares
 from cnc_shape.kinematics import Kinematics
+from cnc_shape.limit_use import LimitUse, LimitWatch
 from cnc_shape.machine import Machine
 from cnc_shape.motion import Block
 from cnc_shape.motors import DutyTally, MotorDuty, duties, servo_motors, tally_duty
@@ -105,11 +106,12 @@ class Summary:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A summary with the signals it was made from, and the programmed path as a polyline to draw."""
+    """A summary with the signals it was made from, the programmed path to draw, and the use of the limits."""
 
     summary: Summary
     signals: tuple[Signals, ...]  # one a case, in the summary's order; empty where none were recorded
     path: FloatArray  # (p,3) mm, the programmed path, arcs chopped for drawing
+    limit_use: LimitUse | None = None  # of the plain motion, where it was planned and recorded
 
     def signal(self, case: str) -> Signals:
         """Return the signals of the case called `case`; their extremes where there are many."""
@@ -240,7 +242,7 @@ def run(
     program
         Its name in the table.
     record
-        Keep the signals for a report.
+        Keep the signals for a report, and what the motion uses of the limits.
     all_signals
         Keep every sample of them, however many there are.
     observers
@@ -254,7 +256,7 @@ def run(
         The signals do not fit into the folder for temporary files.
     """
     trials: list[Trial] = []
-    outline = Outline()
+    outline, watch = Outline(), LimitWatch(setup.machine) if record else None
     samples, cycle_time = 0, 0.0
     for block in blocks:
         unshaped = block.timing is None or block.timing == PLAIN
@@ -273,6 +275,8 @@ def run(
             ]
         if record and unshaped and block.toolpath is not None:
             outline.add(block.toolpath)
+        if watch is not None:
+            watch.advance(block)
         for watcher in (*trials, *observers):
             watcher.advance(block)
         if unshaped:
@@ -283,4 +287,5 @@ def run(
         tuple(trial.summary() for trial in trials),
     )  # fmt: skip
     signals = tuple(found for trial in trials if (found := trial.signals()) is not None)
-    return Run(summary, signals, outline.points())
+    use = None if watch is None else watch.found()
+    return Run(summary, signals, outline.points(), use)

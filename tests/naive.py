@@ -1114,6 +1114,30 @@ def highest_below(place, speed, jerk, at):
     return low
 
 
+# --- use of the limits ----------------------------------------------------------------------------------
+
+
+def axis_motion(profile, m):
+    """Positions of the axes within a piece as polynomials of the time from its start."""
+    law = np.poly1d(
+        [profile.jerk[m] / 6, profile.acceleration[m] / 2, profile.velocity[m], profile.u[m]]
+    )  # fmt: skip
+    return [np.poly1d(column[::-1])(law) for column in profile.path.coefficients[profile.cell[m]].T]
+
+
+def limit_use(profile, points, width, count):
+    """Largest speed, its smallest, and every axis's velocity, acceleration and jerk in buckets of time."""
+    found = np.full((count, 2 + 3 * len(profile.path.axes)), -np.inf)
+    for m in range(len(profile)):
+        e = profile.duration[m] * np.linspace(0.0, 1.0, points)
+        axes = axis_motion(profile, m)
+        asked = np.array([[np.abs(axis.deriv(n)(e)) for axis in axes] for n in (1, 2, 3)])
+        speed = np.linalg.norm(asked[0, :3], axis=0)
+        rows = np.vstack([speed, -speed, asked.reshape(-1, points)]).T
+        np.maximum.at(found, np.minimum(((profile.time[m] + e) / width).astype(int), count - 1), rows)
+    return found
+
+
 # --- when moves are passed ----------------------------------------------------------------------------
 
 
@@ -1184,7 +1208,9 @@ def row_distance(toolpath, row, points, low, high):
     width = high - low
     share = low + 0.5 * width
     for _ in range(5):  # closer and closer about the nearest of a grid
-        grid = np.clip(share[:, None] + width[:, None] * np.linspace(-0.5, 0.5, 41), low[:, None], high[:, None])
+        grid = np.clip(
+            share[:, None] + width[:, None] * np.linspace(-0.5, 0.5, 41), low[:, None], high[:, None]
+        )
         found = curve_points(toolpath, row, grid.ravel()).reshape(*grid.shape, 3)
         distance = np.linalg.norm(points[:, None] - found, axis=2)
         nearest = distance.argmin(axis=1)
@@ -1263,4 +1289,5 @@ def path_length(path):
         c = path.coefficients[:, :, :3]
         speed = np.linalg.norm(c[:, 1] + e * (2 * c[:, 2] + 3 * e * c[:, 3]), axis=1)
         total += 0.5 * weight * (speed * path.length).sum()
-    return total
+
+

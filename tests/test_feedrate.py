@@ -17,7 +17,7 @@ from cnc_shape.certificate import worst_violation
 from cnc_shape.errors import InfeasibleError
 from cnc_shape.feedrate import Profile, rotary_only
 from cnc_shape.kernels.speed_limits import speed_limits
-from cnc_shape.kernels.time_law import backward
+from cnc_shape.kernels.time_law import WORTH, backward, largest_start, quickest_start
 from cnc_shape.limits import Limits
 from cnc_shape.planning import plan, planning
 from cnc_shape.program import PathMode
@@ -199,6 +199,37 @@ def test_speed_limits_of_curved_cells_equal_their_slow_twin(seed, d, alone, bend
     )  # fmt: skip
     assert straight[0] == 0.0
     assert_allclose(limit_v2[0], naive.speed_limits(rows, length, feed_rate, alone, velocity), rtol=1e-9)
+
+
+def test_a_long_gentle_curve_is_braked_at_its_end_alone():
+    """A hat of 3 mm half-width over a turn of 1 degree: two cells, in each of which rise and fall have room."""
+    turn = np.deg2rad(1.0)
+    whole = lines([[0, 0], [3, 0], [3 + 3 * np.cos(turn), 3 * np.sin(turn)]], 1.5)
+    profile = planned(whole)
+    assert len(profile.path) <= 4
+    assert_keeps(profile, MILL)
+    assert_allclose(profile.end_time, 6 / 1.5 + 1.5 / 2000, rtol=1e-4)
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10**6))
+def test_a_row_that_hardly_knows_the_acceleration_does_not_brake_to_rest(seed):
+    """At the largest speed such a row leaves no choice but to brake hard; a grid finds what is worth it."""
+    rng = np.random.default_rng(seed)
+    steep = 10 ** rng.uniform(3, 9)
+    base = np.array([2000.0, 400.0, steep]) * rng.uniform(0.8, 1.2, 3)
+    slope = np.array([30.0, -1000.0, -1.2 * steep]) * rng.uniform(0.5, 1.5, 3)
+    h, next_v2 = 4e-4, rng.uniform(0.05, 0.6)
+    largest = largest_start(2.7, next_v2, h, base, slope)
+    grid = largest * (1.0 - np.concatenate([[0.0], np.logspace(-13, 0, 4000)]))
+    high = (slope * grid[:, None] + base).min(axis=1)
+    following = np.minimum(np.maximum(grid + 2 * h * high, 0.0), next_v2)
+    worth = np.sqrt(grid) + np.sqrt(following) / WORTH
+    found = quickest_start(largest, next_v2, h, base, slope)
+    ours = min(found + 2 * h * (slope * found + base).min(), next_v2)
+    assert found <= largest
+    assert np.sqrt(found) + np.sqrt(max(ours, 0.0)) / WORTH >= worth.max() * (1 - 2e-3)
+    assert ours > 1e-3
 
 
 def test_the_scan_is_the_solution_of_its_linear_programs():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from motions import assert_same_bits, chunks, lines, streamed, wander
+from motions import lines, wander
 from test_jerk import MILL_J, assert_keeps
 
 from cnc_shape.jerk import jerk_planning

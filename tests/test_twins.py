@@ -43,6 +43,7 @@ TWINS = {
     "kernels/kinematics_trunnion.py": ("naive.tilted", "test_kinematics.py"),
     "kernels/knots.py": ("naive.knots", "test_shaped_programs.py"),
     "kernels/layout.py": ("naive.curve_points", "test_contour.py"),
+    "kernels/limit_use.py": ("naive.limit_use", "test_limit_use.py"),
     "kernels/linear.py": ("np.linalg", "test_kinematics.py"),
     "kernels/noise.py": ("naive.normal_noise", "test_noise.py"),
     "kernels/offsets.py": ("naive.smoothed_offset", "test_contour_compensation.py"),

@@ -119,6 +119,10 @@ def simulate(
             from cnc_shape.report.trade_table import trade_json
 
             extra["trade"] = trade_json(kinds)
+        if result.limit_use is not None:
+            from cnc_shape.report.limit_table import limits_json
+
+            extra["planned"] = limits_json(result.limit_use)
         print_json(None, {**summary_json(result.summary), **extra})
     else:
         _print_table(result, kinds, page)

@@ -13,8 +13,8 @@ are planned anew, and where a window has no law between the speeds at its ends, 
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_caps import derivatives, falling_jerk, speed_caps, straight_jerk, tighten
-from cnc_shape.kernels.jerk_certificate import certificate
+from cnc_shape.kernels.jerk_caps import falling_jerk, speed_caps, tighten
+from cnc_shape.kernels.jerk_cells import looked_at, prepared
 from cnc_shape.kernels.jerk_phases import moved
 from cnc_shape.kernels.jerk_pieces import NEAR, cut, index_pieces, more_room, spliced
 from cnc_shape.kernels.jerk_rounding import round_off
@@ -125,8 +125,8 @@ def joint_after(pieces, first_piece, cap, node, cells, start):
 
 @kernel
 def section_law(
-    rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, entry,
-    calm_begin, calm_end, calm_speed, tolerances, most_rounds,
+    rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin, end,
+    entry, calm_begin, calm_end, calm_speed, tolerances, most_rounds,
 ):  # fmt: skip
     """Time law of the cells `begin` to `end`, from the speed `entry` to rest.
 
@@ -153,16 +153,10 @@ def section_law(
         Cells that still ask for too much.
     """
     count = end - begin
-    d = acceleration.size
-    size = length[begin:end].copy()
-    first = np.empty((count, 2, d))
-    bend = np.empty((count, 2, d))
-    third = np.empty((count, d))
-    derivatives(rows[begin:end], size, first, bend, third)
-    straight_a = np.empty(count)
-    straight_b = np.empty(count)
+    size, first, bend, third, most, straight_a, straight_b = prepared(
+        rows, length, limit_v2, straight, along, acceleration, jerk, begin, end
+    )
     limits = limit_v2[begin:end]
-    straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
     ease = np.ones((count, 5))
     lower = np.ones((count, 5))
     changed = np.zeros(count, np.int64)
@@ -171,16 +165,16 @@ def section_law(
     cap = np.empty(count + 1)
     for k in range(calm_begin, calm_end):
         ease[k, 0] = min(1.0, calm_speed / np.sqrt(min(limits[k, 0], limits[k, 1])))
-    speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, 0, count, top, cap)
+    speed_caps(limits, straight_a, bend, third, most[0], most[1], ease, 0, count, top, cap)
     pieces, cell = window_law(
-        size, top, cap, straight_a, straight_b, first, bend, third, acceleration, jerk, ease, 0, entry, 0.0
+        size, top, cap, straight_a, straight_b, first, bend, third, most[0], most[1], ease, 0, entry, 0.0
     )
     work = count
     if cell.size == 0:
         return pieces, cell, cap, work, count
-    certificate(
-        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
-        tolerances, worst,
+    looked_at(
+        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
+        jerk, tolerances, worst,
     )  # fmt: skip
     found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
     first_piece = np.zeros(count + 1, np.int64)
@@ -198,7 +192,7 @@ def section_law(
             while until < count and changed[until] == 1:
                 until += 1
             if until > k:
-                speed_caps(limits, straight_a, bend, third, acceleration, jerk, ease, k, until, top, cap)
+                speed_caps(limits, straight_a, bend, third, most[0], most[1], ease, k, until, top, cap)
             k = until + 1
         made = 0
         filled = 0
@@ -221,8 +215,8 @@ def section_law(
                 work += high - low
                 part, part_cell = window_law(
                     size[low:high], top[low:high], cap[low : high + 1], straight_a[low:high],
-                    straight_b[low:high], first[low:high], bend[low:high], third[low:high], acceleration,
-                    jerk, ease[low:high], low, start, finish,
+                    straight_b[low:high], first[low:high], bend[low:high], third[low:high], most[0],
+                    most[1], ease[low:high], low, start, finish,
                 )  # fmt: skip
                 if part_cell.size > 0:
                     break
@@ -253,9 +247,9 @@ def section_law(
         for n in range(made):
             low = windows[n, 0]
             high = windows[n, 1]
-            certificate(
+            looked_at(
                 pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
-                alone, velocity, acceleration, jerk, tolerances, worst,
+                alone, along, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
     return pieces, cell, cap, work, found

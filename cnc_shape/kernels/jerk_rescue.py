@@ -9,8 +9,7 @@ be slowed until the certificate is content.
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_caps import derivatives, straight_jerk
-from cnc_shape.kernels.jerk_certificate import certificate
+from cnc_shape.kernels.jerk_cells import looked_at, prepared
 from cnc_shape.kernels.jerk_phases import put
 from cnc_shape.kernels.jerk_pieces import cut
 
@@ -51,32 +50,26 @@ def straight_phases(distance, v, a, b, law, cell):
 
 @kernel
 def slow_law(
-    rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, tolerances
+    rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin, end,
+    tolerances,
 ):  # fmt: skip
-    """Pieces of a law of the cells `begin` to `end` from rest to rest, and their cells counted from `begin`."""
+    """Pieces of a law of the cells `begin` to `end` from rest to rest, their cells counted from `begin`."""
     count = end - begin
-    d = acceleration.size
-    size = length[begin:end].copy()
-    first = np.empty((count, 2, d))
-    bend = np.empty((count, 2, d))
-    third = np.empty((count, d))
-    derivatives(rows[begin:end], size, first, bend, third)
-    straight_a = np.empty(count)
-    straight_b = np.empty(count)
-    limits = limit_v2[begin:end]
-    straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
+    size, first, _, _, limits, straight_a, _ = prepared(
+        rows, length, limit_v2, straight, along, acceleration, jerk, begin, end
+    )
     v = np.inf
     a = np.inf
     b = np.inf
     nodes = np.zeros(count + 1)
     for k in range(count):
         nodes[k + 1] = nodes[k] + size[k]
-        v = min(v, np.sqrt(min(limits[k, 0], limits[k, 1])))
-        for i in range(d):
+        v = min(v, np.sqrt(min(limit_v2[begin + k, 0], limit_v2[begin + k, 1])))
+        for i in range(first.shape[2]):
             rate = max(abs(first[k, 0, i]), abs(first[k, 1, i]))
             if rate > 0.0:
-                a = min(a, acceleration[i] / rate)
-                b = min(b, jerk[i] / rate)
+                a = min(a, limits[0, i] / rate)
+                b = min(b, limits[1, i] / rate)
     law = np.empty((PHASES, 5))
     law_cell = np.empty(PHASES, np.int64)
     w = straight_phases(nodes[count], v, a, b, law, law_cell)
@@ -84,9 +77,9 @@ def slow_law(
     cell = np.empty(PHASES + 2 * count + 1, np.int64)
     m = cut(law, law_cell, w, nodes, 0, pieces, cell)
     worst = np.zeros((count, 7))
-    certificate(
-        pieces, cell, 0, m, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
-        tolerances, worst,
+    looked_at(
+        pieces, cell, 0, m, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
+        jerk, tolerances, worst,
     )  # fmt: skip
     share = 1.0
     for k in range(count):

@@ -45,14 +45,13 @@ def stopping_distance(row, h, v, acceleration, jerk):
 
 @kernel
 def window_end(rows, length, stop, limit_v2, acceleration, jerk, at, last, window, ahead):
-    """End of the window that starts with the cell `at`; whether the path up to there has come in; and whether
-    the path rests there.
+    """End of the window that starts with the cell `at`; whether it has come in, whether the path rests there.
 
     Parameters
     ----------
     window, ahead
         Cells and stopping distances that it spans at least.
-    """  # fmt: skip
+    """
     count = length.size
     covered = 0.0
     end = at
@@ -152,13 +151,15 @@ def waited(duration, at, out, out_cell, filled):
 
 @kernel
 def windows_law(
-    rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, tolerances,
-    most_rounds, last, window, ahead, held, held_cell, marks, speeds, counts,
+    rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk,
+    tolerances, most_rounds, last, window, ahead, held, held_cell, marks, speeds, counts,
 ):  # fmt: skip
     """Time law of as much of a path as is final.
 
     Parameters
     ----------
+    along (k,)
+        Limit of the acceleration along each cell; (0,): none.
     last
         Whether nothing follows.
     held (m,6), held_cell (m,)
@@ -199,8 +200,8 @@ def windows_law(
             rests = True
         entry = speeds[1] if marks[0] > 0 else 0.0
         pieces, cell, cap, work, found = section_law(
-            rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, begin, end, entry,
-            0, 0, 0.0, tolerances, most_rounds,
+            rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin,
+            end, entry, 0, 0, 0.0, tolerances, most_rounds,
         )  # fmt: skip
         counts[PLANNED] += work
         if found == 0 and marks[0] > 0:
@@ -210,8 +211,8 @@ def windows_law(
             counts[MERGED] += 1
             entry = speeds[0]
             pieces, cell, cap, work, found = section_law(
-                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, at, end,
-                entry, 0, 0, 0.0, tolerances, most_rounds,
+                rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
+                end, entry, 0, 0, 0.0, tolerances, most_rounds,
             )  # fmt: skip
             counts[PLANNED] += work
             if found > 0:
@@ -226,8 +227,8 @@ def windows_law(
             continue
         elif found > 0:
             pieces, cell = slow_law(
-                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, at, end,
-                tolerances,
+                rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
+                end, tolerances,
             )  # fmt: skip
             counts[SLOWED] += end - at
             rests = True
@@ -252,8 +253,8 @@ def windows_law(
                 break
             counts[CALMED] += 1
             calmed, calmed_cell, calmed_cap, work, found = section_law(
-                rows, length, feed_rate, alone, limit_v2, straight, velocity, acceleration, jerk, at, end,
-                entry, low, high, calm, tolerances, most_rounds,
+                rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
+                end, entry, low, high, calm, tolerances, most_rounds,
             )  # fmt: skip
             counts[PLANNED] += work
             if found == 0:

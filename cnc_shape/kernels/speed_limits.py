@@ -10,6 +10,7 @@ STRAIGHT_SHARE = 1e-7  # -, of the acceleration limit that the curvature of such
 FULL_SPEED = 0.98  # -, |q'| from which the feed itself is the limit: |q'| <= 1 up to rounding
 ROUNDING = 2e-7  # -, of |q'|
 STRAIGHT_ROUNDING = 1e-10  # -, the same on lines; more means a line so short that its own length counts
+NEARLY = 0.98  # -, what a cell taken as straight keeps of its speed and acceleration at least
 FASTEST_V2 = 1e12  # mm^2/s^2 or rad^2/s^2, where nothing else limits
 
 
@@ -127,3 +128,39 @@ def speed_limits(rows, length, feed_rate, alone, velocity, acceleration):
             limit_v2[k, 0] = min(start, end)
             limit_v2[k, 1] = limit_v2[k, 0]
     return limit_v2, straight
+
+
+@kernel
+def almost_straight(rows, length, limit_v2, straight, acceleration):
+    """Take long, gently curved cells as straight: limits of their squared speed, and accelerations.
+
+    A constant acceleration over all of a long cell would spread a short braking over it. Where both a rise
+    and a fall have room in a cell, it may have three pieces like a straight one, if every axis keeps what the
+    curvature asks for at full speed: ``|q'| a <= A - |q''| x``.
+    """
+    d = acceleration.size
+    own_v2 = limit_v2.copy()
+    own = straight.copy()
+    d1 = np.empty(d)
+    d2 = np.empty(d)
+    e1 = np.empty(d)
+    e2 = np.empty(d)
+    for k in range(length.size):
+        h = length[k]
+        if straight[k] > 0.0 or h == 0.0:
+            continue
+        ends(rows[k], h, d1, d2, e1, e2)
+        x = min(limit_v2[k, 0], limit_v2[k, 1])
+        rate = np.inf
+        without = np.inf
+        for i in range(d):
+            most = max(abs(d1[i]), abs(d1[i] + 0.5 * h * d2[i]), abs(e1[i]))
+            if most > 0.0:
+                rate = min(rate, (acceleration[i] - max(abs(d2[i]), abs(e2[i])) * x) / most)
+                without = min(without, acceleration[i] / most)
+        same = x >= NEARLY * max(limit_v2[k, 0], limit_v2[k, 1])
+        if same and x <= rate * h and NEARLY * without <= rate < np.inf:
+            own[k] = rate
+            own_v2[k, 0] = x
+            own_v2[k, 1] = x
+    return own_v2, own

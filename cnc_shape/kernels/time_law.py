@@ -25,6 +25,7 @@ MARGIN = 1e-9  # -, by which the scan must clear the next node's speed to be cal
 NO_LENGTH = 1e-13  # -, of a cell: a shorter piece is rounding
 STEEPEST = 1e7  # -, base of a line over the smallest one, from which the line limits x alone
 SLACK = 4.0 / STEEPEST  # -, of the limit, left for the term that such a line drops
+WORTH = 30.0  # -, by which a speed at the end of a cell has to gain what that at its start gives up
 MOST_STEPS = 60  # of Newton, on a gap of at most 6 d pieces
 
 
@@ -114,6 +115,33 @@ def largest_start(x, next_v2, h, base, slope):
 
 
 @kernel
+def quickest_start(x, next_v2, h, base, slope):
+    """The x0 <= `x` that is large, but for as much as it costs the speed at the cell's end.
+
+    Where a row hardly knows `a`, it lets x0 be so large that no more than braking hard is left, to rest
+    even: a little less, and x1 may be much larger. The speed at the start and a share of that at the end
+    are concave in x0: bisection on the slope of their sum.
+    """
+    _, _, high, high_slope = window(x, base, slope)
+    following = x + 2.0 * h * high
+    if following >= next_v2 or (1.0 + 2.0 * h * high_slope) * np.sqrt(x) >= -WORTH * np.sqrt(
+        max(following, 0.0)
+    ):
+        return x
+    lower = 0.0
+    for _ in range(MOST_STEPS):
+        middle = 0.5 * (lower + x)
+        _, _, high, high_slope = window(middle, base, slope)
+        following = middle + 2.0 * h * high
+        rise = (1.0 + 2.0 * h * high_slope) * np.sqrt(middle) + WORTH * np.sqrt(max(following, 0.0))
+        if following >= next_v2 or rise >= 0.0:
+            lower = middle
+        else:
+            x = middle
+    return lower
+
+
+@kernel
 def backward(rows, length, stop, limit_v2, straight, acceleration, along, before_v2):
     """Largest squared speed at every node from which all that follows can be kept.
 
@@ -165,13 +193,14 @@ def backward(rows, length, stop, limit_v2, straight, acceleration, along, before
         own_next = 0.0
         if k < count - 1 and stop[k + 1] == 0:
             own_next = min(limit_v2[k, 1], limit_v2[k + 1, 0])
-        x = largest_start(x, own_next, h, base, slope)
-        low, _, _, _ = window(x, base, slope)
-        low = max(low, -x / (2.0 * h))
-        if next_v2 * (1.0 - MARGIN) - x >= 2.0 * h * low and k < count - 1:
+        largest = largest_start(x, own_next, h, base, slope)
+        x = quickest_start(largest, own_next, h, base, slope)
+        low, _, high, _ = window(x, base, slope)
+        needed = max(low, -x / (2.0 * h)) if x == largest else min(high, (own_next - x) / (2.0 * h))
+        if next_v2 * (1.0 - MARGIN) - x >= 2.0 * h * needed and k < count - 1:
             free[k] = 1
         else:
-            x = largest_start(x, next_v2, h, base, slope)
+            x = quickest_start(largest_start(x, next_v2, h, base, slope), next_v2, h, base, slope)
         reach_v2[k] = x
     return reach_v2, free
 

@@ -22,6 +22,8 @@ from cnc_shape.program import ROTARY
 from cnc_shape.recording import MOTORS, Samples, Signals, require_finite
 from cnc_shape.report import figures
 from cnc_shape.report.html import Page, render_html
+from cnc_shape.report.limit_figures import limits_figure, speed_figure
+from cnc_shape.report.limit_table import limits_json
 from cnc_shape.report.motor_figures import motor_cases, motor_figure
 from cnc_shape.report.position_figure import modes_over_position, position_figure
 from cnc_shape.report.shaper_figure import shaper_figure
@@ -121,9 +123,7 @@ def write_report(
     kind = context.figure_format
     content = {
         "report.html": _encoded(render_html(run, page)),
-        "results.json": _json(
-            {**summary_json(run.summary), **({"trade": trade_json(trade)} if trade else {})}
-        ),
+        "results.json": _json(_results(run, trade)),
         "tables.csv": _encoded(tables_csv(run.summary)),
         "machine.yaml": _encoded(context.machine),
         MARKER: _run_json(context),
@@ -142,6 +142,15 @@ def write_report(
         make_folder(folder.parent)
     publish_folder(folder, build, marker=MARKER, force=force)
     return folder / "report.html"
+
+
+def _results(run: Run, trade: Sequence[TradeRow]) -> dict[str, Any]:
+    results = summary_json(run.summary)
+    if run.limit_use is not None:
+        results["planned"] = limits_json(run.limit_use)
+    if trade:
+        results["trade"] = trade_json(trade)
+    return results
 
 
 def _motor_file(case: str) -> str:
@@ -168,6 +177,11 @@ def draw(run: Run, context: Context) -> dict[str, Any]:
         "motion": figures.motion_figure(run),
         "vibration": figures.vibration_figure(run),
     }
+    if run.limit_use is not None:
+        drawn["limits"] = limits_figure(run.limit_use)
+        if run.limit_use.travels:
+            drawn["limits_along_path"] = limits_figure(run.limit_use, along_path=True)
+            drawn["speed"] = speed_figure(run.limit_use)
     if context.shapers:
         drawn["shapers"] = shaper_figure(context.shapers, context.modes)
         if varying := modes_over_position(context.shapers, context.modes):

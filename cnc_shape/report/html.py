@@ -14,6 +14,7 @@ from typing import Any
 from cnc_shape import __version__
 from cnc_shape.modes import Mode
 from cnc_shape.pipeline import Run, Summary
+from cnc_shape.report.limit_table import QUANTITIES, feed_words, limit_rows
 from cnc_shape.report.motor_figures import motor_cases
 from cnc_shape.report.rows import UNDER, best_case, compared_with, folded, is_mixed, row_names
 from cnc_shape.report.table import columns, micrometres
@@ -36,6 +37,10 @@ CAPTIONS = {
     "error": "Contour error over time, at the tool and at the drives.",
     "vibration": "Deflection of the structure between drive and tool.",
     "motion": "Speed and acceleration of the command.",
+    "limits": "The planned motion over time: speed of the tool and the programmed feed, and what each axis "
+    "uses of its limits, the largest of every stretch that is drawn.",
+    "limits_along_path": "The same along the path.",
+    "speed": "The planned path, coloured by the speed of the tool.",
     "trade": "Contour error of the tool by kind of shaping: a dot for the structure as modelled, a bar over "
     "all models that the machine file allows for.",
     "shapers": "Left: the impulses. Right: the vibration a mode keeps where its real frequency is off.",
@@ -110,7 +115,13 @@ def render_html(run: Run, page: Page = NO_PAGE) -> str:
             }
             for k, (case, name) in enumerate(zip(summary.cases, row_names(summary), strict=True))
         ],
-        figures=[picture for name, picture in pictures.items() if name not in ("shapers", "modes", "trade")],
+        figures=[picture for name, picture in pictures.items() if name in FROM_SIGNALS],
+        planned=run.limit_use is not None,
+        limit_quantities=QUANTITIES,
+        limit_rows=[] if run.limit_use is None else limit_rows(run.limit_use),
+        limit_note="" if run.limit_use is None else feed_words(run.limit_use),
+        limit_figures=[pictures[name] for name in ("limits", "speed") if name in pictures],
+        limits_along_path=pictures.get("limits_along_path"),
         mixed=is_mixed(summary),
         motor_headings=MOTOR_HEADINGS,
         motors=_motor_rows(summary),
