@@ -29,14 +29,6 @@ def in_chunks(path, limits, size, gentleness=None, path_limits=NO_PATH_LIMITS):
     return profiles, counts, held
 
 
-def counted(path, limits):
-    """The law of a whole path, and what its planning counted."""
-    step = jerk_planning(limits)
-    state, profile = step(None, path, False)
-    _, rest = step(state, path.cut(slice(0, 0)), True)
-    return [profile, rest], state.counts
-
-
 def assert_same_law(parts, once):
     assert join_paths([part.path for part in parts]).u.size == len(once.path)
     for name in COLUMNS:
@@ -67,11 +59,9 @@ def test_chunks_do_not_change_a_bit(kind):
     once = plan(path, limits)
     assert_keeps(once, limits)
     for size in (1, 97, 1000):
-        parts, counts, held = in_chunks(path, limits, size)
+        parts, _, held = in_chunks(path, limits, size)
         assert_same_law(parts, once)
         assert held < len(path)
-    if kind == "slow spiral":  # from window to window it is faster than it could stop
-        assert counts[MERGED] > 0
 
 
 @pytest.mark.usefixtures("small_windows")
@@ -84,6 +74,34 @@ def test_chunks_do_not_change_a_bit_with_path_limits_and_gently():
     for size in (97, 1000):
         parts, _, _ = in_chunks(path, MILL_J, size, factor, path_limits)
         assert_same_law(parts, once[0])
+
+
+@pytest.mark.usefixtures("small_windows")
+def test_a_law_that_is_always_on_its_way_up_is_kept_at_one_speed_for_a_moment():
+    """64 blocks are 0.3 mm: much too few to come near 180 mm/s, or to stop from there."""
+    path = smooth(
+        lines(np.column_stack([0.005 * np.arange(1001), np.zeros(1001)]), 180.0), Smoothing(0.01, 0, 0)
+    )
+    parts, counts, _ = in_chunks(path, MILL_J, 300)
+    assert counts[CALMED] > 0
+    assert_same_law(parts, plan(path, MILL_J))
+    assert_keeps(plan(path, MILL_J), MILL_J)
+
+
+@pytest.mark.usefixtures("small_windows")
+@pytest.mark.parametrize("seed", [1, 2])
+def test_where_no_law_is_found_there_are_rests_and_slow_stretches(monkeypatch, seed):
+    """With a single round, the law of most curved stretches still asks for too much."""
+    monkeypatch.setattr("cnc_shape.jerk.MOST_ROUNDS", 1)
+    path = smooth(wander(np.random.default_rng(seed), 200), Smoothing(0.01))
+    parts, counts, _ = in_chunks(path, MILL_J, 100)
+    assert counts[RESTS] > 0
+    assert counts[SLOWED] > 0
+    once = plan(path, MILL_J)
+    assert_same_law(parts, once)
+    assert_keeps(once, MILL_J)
+    monkeypatch.setattr("cnc_shape.jerk.MOST_ROUNDS", 100)
+    assert once.end_time > plan(path, MILL_J).end_time
 
 
 @pytest.mark.parametrize("seed", [3, 4])
@@ -104,7 +122,7 @@ def test_a_straight_of_100_000_blocks_is_one_move_and_little_of_it_is_held_back(
     assert len(path) > n // 2
     parts, counts, held = in_chunks(path, MILL_J, 1000)
     assert counts[MERGED] == counts[RESTS] == counts[CALMED] == counts[SLOWED] == 0
-    assert_allclose(parts[-1].end_time, naive.rest_to_rest(500.0, 180.0, 2000.0, 5e4), rtol=1e-8)
+    assert_allclose(parts[-1].end_time, naive.rest_to_rest(500.0, 180.0, 2000.0, 5e4), rtol=1e-7)
     assert max(part.velocity.max(initial=0.0) for part in parts) == pytest.approx(180.0)
     ahead = 4 * stop / path.length[:-1].min()
     assert held <= 4 * ahead + 2 * PATIENCE
@@ -135,12 +153,15 @@ def straights(rng, count):
 
 
 def test_the_future_is_felt_a_stopping_distance_ahead_whatever_the_number_of_blocks():
-    """60,000 cells, planned up to 40 places as if they rested there; 64 blocks of look-ahead are too few."""
+    """60,000 cells, planned up to 40 places as if they rested there; 64 blocks of look-ahead are too few.
+
+    While it is still speeding up, the acceleration has to fall before the motion can brake.
+    """
     path = straights(np.random.default_rng(5), 60_000)
     assert len(path) > 50_000
     whole = plan(path, MILL_J)
     border = np.cumsum(np.concatenate([[0.0], path.length]))
-    reach = 180.0 / 2 * (180.0 / 2000 + 2000 / 5e4)
+    reach = 180.0 / 2 * (180.0 / 2000 + 2000 / 5e4) + 180.0 * 2000 / 5e4
     stops = np.flatnonzero(path.stop)
     too_late = 0
     for cut in np.linspace(2000, len(path) - 2000, 40).astype(int):
@@ -148,9 +169,8 @@ def test_the_future_is_felt_a_stopping_distance_ahead_whatever_the_number_of_blo
         part = plan(path.cut(slice(begin, cut)), MILL_J)
         first = int(np.searchsorted(whole.cell, begin)) + int(path.dwell[begin] > 0.0)
         n = len(part)
-        same = part.velocity == whole.velocity[first : first + n]
-        same &= part.duration == whole.duration[first : first + n]
+        same = np.isclose(part.velocity, whole.velocity[first : first + n], rtol=1e-9, atol=0)
         differs = begin + part.cell[np.argmin(same)]
-        assert border[cut] - border[differs] <= 1.05 * reach
+        assert border[cut] - border[differs] <= reach
         too_late += cut - differs > 64
     assert too_late >= 20
