@@ -120,6 +120,6 @@ def _profile(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
 
 _NO_PIECES, _NO_CELLS = np.empty((0, 6)), np.empty(0, np.int64)
 _START = JerkState(
-    (), frozen(np.zeros(2)), 0, PATIENCE, frozen(_NO_PIECES), frozen_integers(_NO_CELLS),
+    (), frozen(np.zeros(2)), 0, 0, frozen(_NO_PIECES), frozen_integers(_NO_CELLS),
     frozen_integers(np.zeros(2, np.int64)), frozen(np.zeros(2)), frozen_integers(np.zeros(5, np.int64)),
 )  # fmt: skip

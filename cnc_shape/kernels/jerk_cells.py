@@ -30,6 +30,26 @@ def along_path(rows, s):
 
 
 @kernel
+def with_speed(rows, along, begin, size, first, bend, third):
+    """The derivatives with those of one axis more, the speed along the path."""
+    count, _, d = first.shape
+    more_first = np.empty((count, 2, d + 1))
+    more_bend = np.empty((count, 2, d + 1))
+    more_third = np.zeros((count, d + 1))
+    for k in range(count):
+        for i in range(d):
+            more_third[k, i] = third[k, i]
+            for side in range(2):
+                more_first[k, side, i] = first[k, side, i]
+                more_bend[k, side, i] = bend[k, side, i]
+        for side in range(2):
+            norm, change = along_path(rows[begin + k], side * size[k])
+            more_first[k, side, d] = norm / along[begin + k]
+            more_bend[k, side, d] = change / along[begin + k]
+    return more_first, more_bend, more_third
+
+
+@kernel
 def prepared(rows, length, limit_v2, straight, along, acceleration, jerk, begin, end):
     """Return what the scans need to know of the cells `begin` to `end`.
 
@@ -55,25 +75,13 @@ def prepared(rows, length, limit_v2, straight, along, acceleration, jerk, begin,
     derivatives(rows[begin:end], size, first, bend, third)
     more = d + 1 if along.size > 0 else d
     limits = np.empty((2, more))
-    limits[0, :d] = acceleration
-    limits[1, :d] = jerk
+    for i in range(d):
+        limits[0, i] = acceleration[i]
+        limits[1, i] = jerk[i]
     if along.size > 0:
         limits[0, d] = 1.0
         limits[1, d] = ANY_JERK
-        wide_first = np.zeros((count, 2, more))
-        wide_bend = np.zeros((count, 2, more))
-        wide_third = np.zeros((count, more))
-        wide_first[:, :, :d] = first
-        wide_bend[:, :, :d] = bend
-        wide_third[:, :d] = third
-        for k in range(count):
-            for side in range(2):
-                norm, change = along_path(rows[begin + k], side * size[k])
-                wide_first[k, side, d] = norm / along[begin + k]
-                wide_bend[k, side, d] = change / along[begin + k]
-        first = wide_first
-        bend = wide_bend
-        third = wide_third
+        first, bend, third = with_speed(rows, along, begin, size, first, bend, third)
     straight_a = np.empty(count)
     straight_b = np.empty(count)
     straight_jerk(

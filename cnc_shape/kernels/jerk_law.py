@@ -159,30 +159,22 @@ def section_law(
     limits = limit_v2[begin:end]
     ease = np.ones((count, 5))
     lower = np.ones((count, 5))
-    changed = np.zeros(count, np.int64)
+    changed = np.ones(count, np.int64)
     worst = np.empty((count, 7))
     top = np.empty(count)
     cap = np.empty(count + 1)
     for k in range(calm_begin, calm_end):
         ease[k, 0] = min(1.0, calm_speed / np.sqrt(min(limits[k, 0], limits[k, 1])))
-    speed_caps(limits, straight_a, bend, third, most[0], most[1], ease, 0, count, top, cap)
-    pieces, cell = window_law(
-        size, top, cap, straight_a, straight_b, first, bend, third, most[0], most[1], ease, 0, entry, 0.0
-    )
-    work = count
-    if cell.size == 0:
-        return pieces, cell, cap, work, count
-    looked_at(
-        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
-        jerk, tolerances, worst,
-    )  # fmt: skip
-    found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
+    pieces = np.empty((0, 6))
+    cell = np.empty(0, np.int64)
     first_piece = np.zeros(count + 1, np.int64)
-    new = np.empty((count + 64, 6))
-    new_cell = np.empty(count + 64, np.int64)
+    new = np.empty((2 * count + 64, 6))
+    new_cell = np.empty(2 * count + 64, np.int64)
     windows = np.empty((count + 1, 4), np.int64)  # first cell, end, first new piece, end
     starts = np.empty(count + 1)
-    rounds = 1
+    work = 0
+    found = count
+    rounds = 0
     while found > 0 and rounds < most_rounds:
         rounds += 1
         index_pieces(cell, cell.size, first_piece, count)
