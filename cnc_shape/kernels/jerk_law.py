@@ -169,8 +169,8 @@ def section_law(
     if cell.size == 0:
         return pieces, cell, work, count
     certificate(
-        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
-        tolerances, worst,
+        pieces, cell, 0, cell.size, straight_a, top, rows, begin, feed_rate, alone, velocity, acceleration,
+        jerk, tolerances, worst,
     )  # fmt: skip
     found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
     first_piece = np.zeros(count + 1, np.int64)
@@ -243,7 +243,7 @@ def section_law(
             low = windows[n, 0]
             high = windows[n, 1]
             certificate(
-                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
+                pieces, cell, first_piece[low], first_piece[high], straight_a, top, rows, begin, feed_rate,
                 alone, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
