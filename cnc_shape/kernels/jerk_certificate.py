@@ -1,151 +1,85 @@
 """What a time law with jerk asks of the machine, and whether its pieces follow each other.
 
-Along a piece the jerk of an axis, ``q' b + 3 q'' v a + q''' v^3``, is a polynomial of degree 6 in time: where
-none of its Bernstein coefficients exceeds the limit, it does not; halving the piece brings them nearer.
+Along a piece the acceleration and jerk of an axis are ``q' a + q'' v^2`` and ``q' b + 3 q'' v a + q''' v^3``.
+A smooth function exceeds its values at the ends of an interval of length h by at most ``h^2/8`` of its
+largest second derivative. Those are
+
+    q'' (4 v b + 3 a^2) + 6 q''' v^2 a,     10 q'' a b + q''' v (10 v b + 15 a^2)
+
+so most pieces are known to keep their limits by a look at both ends; halving a piece brings the bound nearer.
 """
 # pyright: basic
 
 import numpy as np
 
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined, kernel
 from cnc_shape.kernels.jerk_phases import moved
 
 POINTS = 9  # of a piece at which velocity, acceleration and feed are looked at in planning
 SMALLEST_SHARE = 1.0 / 64.0  # -, of a piece that is halved
+UNSURE = 1e-3  # -, of the limit, between the bound of an excess and what is there for sure
+AT_TOP = 1e-12  # -, by which the speed may exceed its cap by rounding
 
 
-@kernel
-def in_bernstein(powers, out):
-    """Bernstein coefficients (n+1,) of a polynomial of degree n on [0, 1], from its powers (n+1,)."""
-    degree = out.size - 1
-    for i in range(degree + 1):
-        value = 0.0
-        share = 1.0  # binomial(i, k) over binomial(degree, k)
-        for k in range(i + 1):
-            value += share * powers[k]
-            if k < degree:
-                share *= (i - k) / (degree - k)
-        out[i] = value
+@inlined
+def largest_loads(c, s, v, a, b, t, acceleration, jerk, enough_a, enough_j):
+    """Bounds of the ratios of acceleration and jerk to their limits along a piece.
 
-
-@kernel
-def jerk_parts(s, v, a, b, t, powers, parts):
-    """Bernstein coefficients (5,7) of s, s^2, v a, s v a and v^3 along a piece; `powers` (5,7) is scratch."""
-    s1 = v * t
-    s2 = a * t * t / 2.0
-    s3 = b * t * t * t / 6.0
-    v1 = a * t
-    v2 = b * t * t / 2.0
-    a1 = b * t
-    powers[:] = 0.0
-    place = (s, s1, s2, s3)
-    speed = (v, v1, v2)
-    for i in range(4):
-        powers[0, i] = place[i]
-        for j in range(4):
-            powers[1, i + j] += place[i] * place[j]
-    for i in range(3):
-        powers[2, i] += speed[i] * a
-        powers[2, i + 1] += speed[i] * a1
-        for j in range(3):
-            for k in range(3):
-                powers[4, i + j + k] += speed[i] * speed[j] * speed[k]
-    for i in range(4):
-        for j in range(4):
-            powers[3, i + j] += place[i] * powers[2, j]
-    for n in range(5):
-        in_bernstein(powers[n], parts[n])
-
-
-@kernel
-def jerk_bound(c, s, v, a, b, t, jerk, enough, powers, parts, waiting):
-    """Bound of the ratio of jerk to its limit along a piece, as near as it takes to tell it from `enough`.
-
-    `waiting` (n,2) is scratch: parts of the piece that are still to be looked at.
+    As near as it takes to tell them from `enough_a` and `enough_j`, and to know those that are more.
     """
-    found = 0.0
-    waiting[0, 0] = 0.0
-    waiting[0, 1] = 1.0
-    count = 1
-    while count > 0:
-        count -= 1
-        begin = waiting[count, 0]
-        share = waiting[count, 1]
-        e = begin * t
-        here_v = v + e * (a + e * b / 2.0)
-        here_a = a + e * b
-        jerk_parts(s + moved(v, a, b, e), here_v, here_a, b, share * t, powers, parts)
-        bound = 0.0
-        sure = 0.0
-        for i in range(jerk.size):
-            for n in range(7):
-                first = c[1, i] + 2.0 * c[2, i] * parts[0, n] + 3.0 * c[3, i] * parts[1, n]
-                bent = 6.0 * c[2, i] * parts[2, n] + 18.0 * c[3, i] * parts[3, n]
-                load = abs(first * b + bent + 6.0 * c[3, i] * parts[4, n]) / jerk[i]
-                bound = max(bound, load)
-                if n == 0 or n == 6:
-                    sure = max(sure, load)
-        if bound > enough and sure <= enough and share > SMALLEST_SHARE:
-            for half in range(2):
-                waiting[count, 0] = begin + half * 0.5 * share
-                waiting[count, 1] = 0.5 * share
-                count += 1
-        else:
-            found = max(found, bound)
-    return found
-
-
-@kernel
-def acceleration_bound(c, s, v, a, b, t, acceleration, enough, powers, parts, waiting):
-    """The same for ``q' a + q'' v^2``, of degree 7; `powers` and `parts` (5,8) are scratch."""
-    found = 0.0
-    waiting[0, 0] = 0.0
-    waiting[0, 1] = 1.0
-    count = 1
-    while count > 0:
-        count -= 1
-        begin = waiting[count, 0]
-        share = waiting[count, 1]
-        e = begin * t
+    found_a = 0.0
+    found_j = 0.0
+    share = 1.0
+    begin = 0.0
+    while begin < 1.0:
         h = share * t
-        here_v = v + e * (a + e * b / 2.0)
-        here_a = a + e * b
-        place = (s + moved(v, a, b, e), here_v * h, here_a * h * h / 2.0, b * h * h * h / 6.0)
-        speed = (here_v, here_a * h, b * h * h / 2.0)
-        powers[:] = 0.0
-        powers[0, 0] = here_a
-        powers[0, 1] = b * h
-        for n in range(3):
-            for k in range(3):
-                powers[3, n + k] += speed[n] * speed[k]
-        for n in range(4):
-            for k in range(2):
-                powers[1, n + k] += place[n] * powers[0, k]
-            for k in range(5):
-                powers[4, n + k] += place[n] * powers[3, k]
-        for n in range(4):
-            for k in range(5):
-                powers[2, n + k] += place[n] * powers[1, k]
-        for n in range(5):
-            in_bernstein(powers[n], parts[n])
-        bound = 0.0
-        sure = 0.0
+        e = begin * t
+        s0 = s + moved(v, a, b, e)
+        v0 = v + e * (a + e * b / 2.0)
+        a0 = a + e * b
+        s1 = s0 + moved(v0, a0, b, h)
+        v1 = v0 + h * (a0 + h * b / 2.0)
+        a1 = a0 + h * b
+        most_a = max(abs(a0), abs(a1))
+        most_v = max(v0, v1) + (abs(b) * h * h / 8.0 if b < 0.0 else 0.0)
+        bend_a = 4.0 * most_v * abs(b) + 3.0 * most_a * most_a
+        third_a = 6.0 * most_v * most_v * most_a
+        bend_j = 10.0 * most_a * abs(b)
+        third_j = most_v * (10.0 * most_v * abs(b) + 15.0 * most_a * most_a)
+        square = h * h / 8.0
+        sure_a = 0.0
+        sure_j = 0.0
+        bound_a = 0.0
+        bound_j = 0.0
         for i in range(acceleration.size):
-            for n in range(8):
-                load = c[1, i] * parts[0, n] + 2.0 * c[2, i] * (parts[1, n] + parts[3, n])
-                load += 3.0 * c[3, i] * (parts[2, n] + 2.0 * parts[4, n])
-                load = abs(load) / acceleration[i]
-                bound = max(bound, load)
-                if n == 0 or n == 7:
-                    sure = max(sure, load)
-        if bound > enough and sure <= enough and share > SMALLEST_SHARE:
-            for half in range(2):
-                waiting[count, 0] = begin + half * 0.5 * share
-                waiting[count, 1] = 0.5 * share
-                count += 1
-        else:
-            found = max(found, bound)
-    return found
+            third = 6.0 * c[3, i]
+            bend0 = 2.0 * c[2, i] + third * s0
+            bend1 = 2.0 * c[2, i] + third * s1
+            first0 = c[1, i] + s0 * (2.0 * c[2, i] + 0.5 * third * s0)
+            first1 = c[1, i] + s1 * (2.0 * c[2, i] + 0.5 * third * s1)
+            load_a = max(abs(first0 * a0 + bend0 * v0 * v0), abs(first1 * a1 + bend1 * v1 * v1))
+            load_j = max(
+                abs(first0 * b + v0 * (3.0 * bend0 * a0 + third * v0 * v0)),
+                abs(first1 * b + v1 * (3.0 * bend1 * a1 + third * v1 * v1)),
+            )
+            bend = max(abs(bend0), abs(bend1))
+            third = abs(third)
+            sure_a = max(sure_a, load_a / acceleration[i])
+            sure_j = max(sure_j, load_j / jerk[i])
+            bound_a = max(bound_a, (load_a + square * (bend * bend_a + third * third_a)) / acceleration[i])
+            bound_j = max(bound_j, (load_j + square * (bend * bend_j + third * third_j)) / jerk[i])
+        unsure = bound_a > max(enough_a, found_a) and (sure_a <= enough_a or bound_a - sure_a > UNSURE)
+        if bound_j > max(enough_j, found_j) and (sure_j <= enough_j or bound_j - sure_j > UNSURE):
+            unsure = True
+        if unsure and share > SMALLEST_SHARE:
+            share *= 0.5
+            continue
+        found_a = max(found_a, bound_a)
+        found_j = max(found_j, bound_j)
+        begin += share
+        while share < 1.0 and begin % (2.0 * share) == 0.0:
+            share *= 2.0
+    return found_a, found_j
 
 
 @kernel
@@ -166,66 +100,71 @@ def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, w
 
 
 @kernel
+def largest_at_points(c, alone, piece, velocity, acceleration, jerk, feed_rate, loads):
+    """Largest ratios (4,) of velocity, acceleration, jerk but for b, and feed at points of a piece."""
+    loads[:] = 0.0
+    v = piece[3]
+    a = piece[4]
+    b = piece[5]
+    for n in range(POINTS):
+        e = piece[1] * n / (POINTS - 1)
+        piece_loads(
+            c, alone, piece[2] + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, 0.0, velocity,
+            acceleration, jerk, feed_rate, loads,
+        )  # fmt: skip
+
+
+@kernel
 def certificate(
-    pieces,
-    cell,
-    begin,
-    end,
-    straight_a,
-    rows,
-    first_cell,
-    feed_rate,
-    alone,
-    velocity,
-    acceleration,
-    jerk,
-    tolerances,
-    worst,
-):
+    pieces, cell, begin, end, straight_a, top, rows, first_cell, feed_rate, alone, velocity, acceleration,
+    jerk, tolerances, worst,
+):  # fmt: skip
     """Largest ratios (k,7) of what the law asks for to the limits, in the cells of pieces `begin` to `end`.
 
     Velocity, acceleration, feed; jerk where the path jerk b is 0, where it is positive, where it is
     negative; jerk but for that by b. Acceleration and jerks are bounds, as near as it takes to tell them
-    from what is tolerated; the others are looked for at some points of every piece. Straight cells keep
-    their limits by construction.
+    from what is tolerated. Velocity and feed are looked for at some points of pieces faster than the `top`
+    speed of their cell, jerk but for b in cells with too much jerk. Straight cells keep their limits by
+    construction.
     """
-    for m in range(begin, end):
-        worst[cell[m], :] = 0.0
-    powers = np.empty((5, 7))
-    parts = np.empty((5, 7))
-    more_powers = np.empty((5, 8))
-    more_parts = np.empty((5, 8))
-    waiting = np.empty((64, 2))
     loads = np.empty(4)
-    for m in range(begin, end):
+    m = begin
+    while m < end:
         k = cell[m]
+        first = m
+        worst[k, :] = 0.0
+        while m < end and cell[m] == k:
+            m += 1
         if straight_a[k] > 0.0:
             continue
-        whole = first_cell + k
-        s = pieces[m, 2]
-        v = pieces[m, 3]
-        a = pieces[m, 4]
-        b = pieces[m, 5]
-        t = pieces[m, 1]
-        loads[:] = 0.0
-        for n in range(POINTS):
-            e = t * n / (POINTS - 1)
-            piece_loads(
-                rows[whole], alone[whole], s + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, 0.0,
-                velocity, acceleration, jerk, feed_rate[whole], loads,
-            )  # fmt: skip
-        worst[k, 0] = max(worst[k, 0], loads[0])
-        if loads[1] <= 1.0 + tolerances[1]:
-            loads[1] = acceleration_bound(
-                rows[whole], s, v, a, b, t, acceleration, 1.0 + tolerances[1], more_powers, more_parts,
-                waiting,
-            )  # fmt: skip
-        worst[k, 1] = max(worst[k, 1], loads[1])
-        worst[k, 2] = max(worst[k, 2], loads[3])
-        worst[k, 6] = max(worst[k, 6], loads[2])
-        bound = jerk_bound(rows[whole], s, v, a, b, t, jerk, 1.0 + tolerances[2], powers, parts, waiting)
-        n = 3 if b == 0.0 else (4 if b > 0.0 else 5)
-        worst[k, n] = max(worst[k, n], bound)
+        c = rows[first_cell + k]
+        for n in range(first, m):
+            s = pieces[n, 2]
+            v = pieces[n, 3]
+            a = pieces[n, 4]
+            b = pieces[n, 5]
+            t = pieces[n, 1]
+            most_a, most_j = largest_loads(
+                c, s, v, a, b, t, acceleration, jerk, 1.0 + tolerances[1], 1.0 + tolerances[2]
+            )
+            worst[k, 1] = max(worst[k, 1], most_a)
+            kind = 3 if b == 0.0 else (4 if b > 0.0 else 5)
+            worst[k, kind] = max(worst[k, kind], most_j)
+            fastest = max(v, v + t * (a + t * b / 2.0)) + max(0.0, -b * t * t / 8.0)
+            if fastest > top[k] * (1.0 + AT_TOP):
+                whole = first_cell + k
+                largest_at_points(
+                    c, alone[whole], pieces[n], velocity, acceleration, jerk, feed_rate[whole], loads
+                )
+                worst[k, 0] = max(worst[k, 0], loads[0])
+                worst[k, 2] = max(worst[k, 2], loads[3])
+        if max(worst[k, 3], max(worst[k, 4], worst[k, 5])) > 1.0 + tolerances[2]:
+            whole = first_cell + k
+            for n in range(first, m):
+                largest_at_points(
+                    c, alone[whole], pieces[n], velocity, acceleration, jerk, feed_rate[whole], loads
+                )
+                worst[k, 6] = max(worst[k, 6], loads[2])
 
 
 @kernel

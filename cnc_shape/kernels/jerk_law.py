@@ -240,7 +240,7 @@ def section_law(
             low = windows[n, 0]
             high = windows[n, 1]
             looked_at(
-                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
+                pieces, cell, first_piece[low], first_piece[high], straight_a, top, rows, begin, feed_rate,
                 alone, along, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
