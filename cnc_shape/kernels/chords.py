@@ -7,7 +7,7 @@ from cnc_shape.kernels import kernel
 
 ROTARY_MERGE_TOLERANCE = 1e-4  # rad
 WINDOW = 64  # edges that one chord may replace
-MANY = 8  # edges: fewer are not a pattern
+MANY = 8  # edges: fewer are not a pattern; a chord that replaces fewer is worth a look for noise
 STRAIGHT = 1e-6  # rad, a smaller turn is none
 NOISE_TURN = 0.1  # -, net turn over the sum of turns, of a run that is noise
 
@@ -143,9 +143,9 @@ def merge(start, end, tolerance, merge_tolerance, noise_tolerance, feed_rate, st
         off = 0.0
         if limit > k + 1:
             count, off = chord_reach(start, end, k, limit, merge_tolerance[k])
-            if count < limit - k and noise_tolerance[k] > merge_tolerance[k]:
+            if count < min(limit - k, MANY) and noise_tolerance[k] > merge_tolerance[k]:
                 noise, noise_off = chord_reach(start, end, k, limit, noise_tolerance[k])
-                if noise >= max(MANY, count + 1) and turns_to_and_fro(start, end, k, k + noise):
+                if noise >= MANY and turns_to_and_fro(start, end, k, k + noise):
                     count = noise
                     off = noise_off
                     rest = run - k - noise
