@@ -17,8 +17,8 @@ from cnc_shape.kernels.jerk_caps import derivatives, falling_jerk, speed_caps, s
 from cnc_shape.kernels.jerk_certificate import certificate
 from cnc_shape.kernels.jerk_phases import moved
 from cnc_shape.kernels.jerk_pieces import NEAR, cut, index_pieces, more_room, spliced
-from cnc_shape.kernels.jerk_rounding import round_off
 from cnc_shape.kernels.jerk_refine import refined
+from cnc_shape.kernels.jerk_rounding import round_off
 from cnc_shape.kernels.jerk_scan import PHASES, envelope, mirrored, scan
 
 NO_ACCELERATION = 1e-9  # s, times the jerk: as good as none
