@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from motions import MILL, lines, refined, wander
 from numpy.testing import assert_allclose
 from paths import arc, dwell, line, toolpath
-from test_feedrate import SQUARE, spline_path
+from test_feedrate import SQUARE
 
 from cnc_shape.arrays import frozen
 from cnc_shape.certificate import worst_violation
@@ -21,7 +21,7 @@ from cnc_shape.limits import Limits
 from cnc_shape.planning import plan
 from cnc_shape.program import PathMode
 from cnc_shape.readers import read_program
-from cnc_shape.smoothing import Path, Smoothing, smooth
+from cnc_shape.smoothing import Smoothing, smooth
 from cnc_shape.toolpath import build_toolpath
 from cnc_shape.trajectory import sample
 
@@ -219,30 +219,6 @@ def test_an_axis_without_a_jerk_limit_beside_one_with():
     assert_keeps(profile, [replace(limit, jerk=min(limit.jerk, 2e9)) for limit in limits])
     times = [planned(lines(corners(8), 200.0), bounds, 0.1).end_time for bounds in (MILL, MILL_J)]
     assert times[0] < profile.end_time < times[1]
-
-
-@pytest.mark.parametrize(("j", "excess"), [(50.0, 0.03), (25.0, 0.06)])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_splines_take_some_percent_longer_than_linear_programs_find(seed, j, excess):
-    path, _ = spline_path(np.random.default_rng(seed).uniform(-30, 30, size=(6, 3)))
-    path = replace(path, feed_rate=frozen(np.full(len(path), 250.0)))
-    assert_near_the_fastest(path, [Limits(300.0, 5000.0, 5000.0 * j)] * 3, excess)
-
-
-@pytest.mark.parametrize(("tolerance", "j", "excess"), [(0.1, 25.0, 0.15), (0.3, 50.0, 0.18)])
-def test_corners_take_some_percent_longer_than_linear_programs_find(tolerance, j, excess):
-    path = refined(smooth(lines(corners(1), 200.0), Smoothing(tolerance)), 4)
-    assert_near_the_fastest(path, [Limits(200.0, 2000.0, 2000.0 * j)] * 3, excess)
-
-
-def assert_near_the_fastest(path: Path, limits, excess):
-    profile = plan(path, limits)
-    assert_keeps(profile, limits)
-    nodes = np.concatenate([[0.0], np.cumsum(path.length[path.length > 0.0])])
-    guess = naive.speeds_at(profile, nodes)
-    guess[[0, -1]] = 0.0
-    fastest = naive.fastest_with_jerk(path, limits, guess)
-    assert fastest * 0.999 <= profile.end_time <= fastest * (1.0 + excess)
 
 
 def test_the_certificate_is_that_of_a_plain_loop():

@@ -24,10 +24,11 @@ from cnc_shape.kernels import kernel
 POINTS = 4  # of a segment: its ends, and its node seen from both cells
 LEAST_SLACK = 0.2  # -, of a limit, to start with
 FIRST_GAP = 0.1  # -, of the time that the multipliers stand for at first
+NEARER = 0.3  # -, of both, from coefficients that are good but for some rows
 TO_BORDER = 0.99  # -, of the way to the nearest slack or multiplier of 0
 SMALL_GAP = 2e-3  # -, of the time: as good as the fastest
-KEPT = 2e-4  # -, by which limits may be exceeded then
-MOST_ITERATIONS = 30
+KEPT = 2e-5  # -, by which limits may be exceeded then
+MOST_ITERATIONS = 40
 
 
 @kernel
@@ -58,11 +59,12 @@ def solved(diagonal, first, second, right):
 
 
 @kernel
-def begun(c, border, value, rows, cap, room, share, slack, price):
+def begun(c, border, value, rows, cap, room, near, share, slack, price):
     """First slacks, multipliers and shares of the bounds J/v; returns their mean product, number, the time.
 
     Rows of zeros and those of a place that a neighbour has as well keep a slack of 0: they are no rows.
     """
+    least = near * LEAST_SLACK
     time = 0.0
     count = 0
     for s in range(cap.shape[0]):
@@ -74,7 +76,7 @@ def begun(c, border, value, rows, cap, room, share, slack, price):
             for j in range(slack.shape[2]):
                 slack[s, p, j] = 0.0
             if p > 0 or s == 0:
-                slack[s, p, 0] = max(1.0 - x / cap[s, p], LEAST_SLACK)
+                slack[s, p, 0] = max(1.0 - x / cap[s, p], least)
                 count += 1
             for j in range(rows.shape[2]):
                 r = rows[s, p, j]
@@ -83,10 +85,10 @@ def begun(c, border, value, rows, cap, room, share, slack, price):
                 load = r[0] * c[s] + r[1] * c[s + 1] + r[2] * c[s + 2]
                 if 2 * j >= rows.shape[2]:
                     load *= share[s, p]
-                slack[s, p, 1 + 2 * j] = max(room[s, j] - load, LEAST_SLACK)
-                slack[s, p, 2 + 2 * j] = max(room[s, j] + load, LEAST_SLACK)
+                slack[s, p, 1 + 2 * j] = max(room[s, j] - load, least)
+                slack[s, p, 2 + 2 * j] = max(room[s, j] + load, least)
                 count += 2
-    mean = FIRST_GAP * time / count
+    mean = near * FIRST_GAP * time / count
     for s in range(cap.shape[0]):
         for p in range(POINTS):
             for j in range(slack.shape[2]):
@@ -96,7 +98,7 @@ def begun(c, border, value, rows, cap, room, share, slack, price):
 
 
 @kernel
-def interior(c, border, value, rows, cap, room, share, slack, price, more_slack, more_price):
+def interior(c, border, value, rows, cap, room, near, share, slack, price, more_slack, more_price):
     """Bring coefficients to those of the fastest law that keeps the rows; returns whether that was reached.
 
     Parameters
@@ -113,6 +115,8 @@ def interior(c, border, value, rows, cap, room, share, slack, price, more_slack,
         Highest x.
     room (n,2 d)
         Shares of the limits that may be used.
+    near
+        How far from the fastest law the coefficients are: 1, or `NEARER`.
     share (n,4), slack, price, more_slack, more_price (n,4,1+4 d)
         Scratch.
     """
@@ -122,7 +126,7 @@ def interior(c, border, value, rows, cap, room, share, slack, price, more_slack,
     first = np.empty(n + 2)
     second = np.empty(n + 2)
     step = np.empty(n + 2)
-    mean, count, time = begun(c, border, value, rows, cap, room, share, slack, price)
+    mean, count, time = begun(c, border, value, rows, cap, room, near, share, slack, price)
     centring = 0.2
     for _ in range(MOST_ITERATIONS):
         diagonal[:] = 0.0

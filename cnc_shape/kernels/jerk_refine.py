@@ -13,8 +13,8 @@ import numpy as np
 
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_caps import derivatives, straight_jerk
-from cnc_shape.kernels.jerk_certificate import certificate
-from cnc_shape.kernels.jerk_interior import interior
+from cnc_shape.kernels.jerk_certificate import certificate, piece_loads
+from cnc_shape.kernels.jerk_interior import KEPT, NEARER, interior
 from cnc_shape.kernels.jerk_phases import moved
 from cnc_shape.kernels.jerk_spline import LEAST_NODES, limit_rows, spline, spline_phases, window_nodes
 
@@ -26,9 +26,12 @@ SHORTEST_CELL = 1e-7  # mm or rad, between nodes
 ROOM_ACCELERATION = 1.0 - 1e-3  # -, of the limits that the law between its nodes may use
 ROOM_JERK = 1.0 - 4e-3
 ROOM_SPEED_V2 = 1.0 - 4e-4
-WIDE = 1.002  # -, of them at the ends of a window, where the law is given
+ROOM_ROUNDING = 1.0 - 2.0 * KEPT
+WIDE = 1.002  # -, of acceleration at the ends of a window, where the law is given
 NEAR_ENDS = 8  # segments over which the room becomes less
-MOST_TRIES = 6
+MOST_TRIES = 8
+LEAST_LEFT = 0.8  # -, of the room, after a try
+SHORTEST_STEP = 1e-3  # s, mean time in the cells of a window that is worth it
 WORTH = 1e-6  # -, of its time by which a window must get shorter
 
 
@@ -71,32 +74,37 @@ def less_room(worst, at_cell, tolerances, room, cap):
             jerked = max(jerked, max(own[3], max(own[4], own[5])))
         if fast > 1.0 + tolerances[0]:
             for p in range(4):
-                cap[s, p] *= (1.0 - 1e-5) / (fast * fast)
+                cap[s, p] *= max((1.0 - 1e-5) / (fast * fast), LEAST_LEFT)
             found += 1
         if pushed > 1.0 + tolerances[1]:
             for i in range(d):
-                room[s, i] *= (1.0 - 1e-5) / pushed
+                room[s, i] *= max((1.0 - 1e-5) / pushed, LEAST_LEFT)
             found += 1
         if jerked > 1.0 + tolerances[2]:
             for i in range(d):
-                room[s, d + i] /= jerked
+                room[s, d + i] *= max(1.0 / jerked, LEAST_LEFT)
             found += 1
     return found
 
 
 @kernel
-def peaks(pieces, cell, worst):
-    """Raise the ratios of velocity and feed by what speeds within pieces exceed those at their ends."""
+def peaks(pieces, cell, rows, feed_rate, alone, velocity, acceleration, jerk, worst):
+    """Raise the ratios of velocity and feed to those where the speed is highest within a piece."""
+    loads = np.empty(4)
     for m in range(cell.size):
         v = pieces[m, 3]
         a = pieces[m, 4]
         b = pieces[m, 5]
-        end_a = a + b * pieces[m, 1]
-        if a > 0.0 and end_a < 0.0:
-            most = v - 0.5 * a * a / b
-            end_v = v + 0.5 * (a + end_a) * pieces[m, 1]
-            for n in (0, 2):
-                worst[cell[m], n] *= most / max(v, end_v)
+        if a > 0.0 and a + b * pieces[m, 1] < 0.0:
+            k = cell[m]
+            t = -a / b
+            loads[:] = 0.0
+            piece_loads(
+                rows[k], alone[k], pieces[m, 2] + moved(v, a, b, t), v + 0.5 * a * t, 0.0, 0.0, velocity,
+                acceleration, jerk, feed_rate[k], loads,
+            )  # fmt: skip
+            worst[k, 0] = max(worst[k, 0], loads[0])
+            worst[k, 2] = max(worst[k, 2], loads[3])
 
 
 @kernel
@@ -111,6 +119,8 @@ def refined_window(
     time = 0.0
     for m in range(begin, end + 1):
         time += (finish if m == end else pieces[m, 1]) - (start if m == begin else 0.0)
+    if time < SHORTEST_STEP * (cell[end] - cell[begin]):
+        return none, no_cell
     step = max(STEP * rise, LEAST_STEPS * time)
     most = int(time / step) + 2 * (end - begin) + 8
     at = np.empty(most)
@@ -144,9 +154,12 @@ def refined_window(
         wide = WIDE if near == 0.0 else 1.0
         for i in range(d):
             room[s, i] = wide * (1.0 - near * (1.0 - ROOM_ACCELERATION))
-            room[s, d + i] = wide * (1.0 - near * (1.0 - ROOM_JERK))
+            room[s, d + i] = 1.0 - near * (1.0 - ROOM_JERK)
         for p in range(4):
-            cap[s, p] *= wide * (1.0 - near * (1.0 - ROOM_SPEED_V2))
+            cap[s, p] *= ROOM_ROUNDING - near * (1.0 - ROOM_SPEED_V2)
+    for p in range(3):
+        cap[0, p] *= 2.0  # given
+        cap[n - 1, p + 1] *= 2.0
     share = np.empty((n, 4))
     slack = np.empty((n, 4, 1 + 4 * d))
     price = np.empty((n, 4, 1 + 4 * d))
@@ -156,9 +169,14 @@ def refined_window(
     new_cell = np.empty(2 * n, np.int64)
     worst = np.empty((straight_a.size, 7))
     curved = np.zeros(straight_a.size)
+    near = 1.0
     for _ in range(MOST_TRIES):
-        if not interior(c, border, value, row, cap, room, share, slack, price, more_slack, more_price):
+        reached = interior(
+            c, border, value, row, cap, room, near, share, slack, price, more_slack, more_price
+        )
+        if not reached:
             return none, no_cell
+        near = NEARER
         if not spline_phases(c, place, border, centre, at, at_cell, new, new_cell):
             return none, no_cell
         shorter = 0.0
@@ -167,10 +185,10 @@ def refined_window(
         if not shorter < time * (1.0 - WORTH):
             return none, no_cell
         certificate(
-            new, new_cell, 0, 2 * n, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
+            new, new_cell, 0, 2 * n, curved, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
             tolerances, worst,
         )  # fmt: skip
-        peaks(new, new_cell, worst)
+        peaks(new, new_cell, rows, feed_rate, alone, velocity, acceleration, jerk, worst)
         if less_room(worst, at_cell, tolerances, room, cap) == 0:
             return new, new_cell
     return none, no_cell
@@ -178,8 +196,9 @@ def refined_window(
 
 @kernel
 def refined(
-    pieces, cell, rows, length, feed_rate, alone, limit_v2, straight_a, velocity, acceleration, jerk, tolerances
-):
+    pieces, cell, rows, length, feed_rate, alone, limit_v2, straight_a, velocity, acceleration, jerk,
+    tolerances,
+):  # fmt: skip
     """Pieces (m,6) of a law from rest to rest and their cells, where it could be made faster."""
     rise = rise_time(acceleration, jerk)
     size = cell.size

@@ -171,7 +171,8 @@ def two_phases(v0, a0, v1, a1, h1, h2, b, out):
     """
     b1 = b
     b2 = b
-    for n in range(MOST_STEPS):
+    size = miss_v = miss_a = t1 = t2 = 0.0
+    for _ in range(MOST_STEPS):
         t1, v, a = after(v0, a0, b1, h1, 2.0 * h1 / (v0 + v1))
         t2, end_v, end_a = after(v, a, b2, h2, h2 / v1)
         out[0] = t1
