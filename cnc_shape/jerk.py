@@ -52,7 +52,7 @@ def jerk_planning(
 
     Velocity, acceleration and feed are kept to 1e-6, jerk to 1e-3. It is not quite the fastest such motion:
     on straight lines it is, on curves it takes 1 to 4 % longer, and up to 15 % where cells follow each other
-    in less than a millisecond (`kernels/jerk_refine.py`).
+    in less than two milliseconds (`kernels/jerk_refine.py`).
     """
     velocity = frozen([limit.velocity for limit in limits])
     acceleration = frozen([limit.acceleration for limit in limits])

@@ -30,7 +30,8 @@ WIDE = 1.002  # -, of acceleration at the ends of a window, where the law is giv
 NEAR_ENDS = 8  # segments over which the room becomes less
 MOST_TRIES = 8
 LEAST_LEFT = 0.8  # -, of the room, after a try
-SHORTEST_STEP = 1e-3  # s, mean time in the cells of a window that is worth it
+SHORTEST_STEP = 2e-3  # s, mean time in the cells of a window that is worth it
+SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: the jerk limit is hardly felt
 WORTH = 1e-6  # -, of its time by which a window must get shorter
 
 
@@ -200,6 +201,8 @@ def refined(
 ):  # fmt: skip
     """Pieces (m,6) of a law from rest to rest and their cells, where it could be made faster."""
     rise = rise_time(acceleration, jerk)
+    if rise < SHORTEST_RISE:
+        return pieces, cell
     size = cell.size
     out = np.empty((2 * size + 64, 6))
     out_cell = np.empty(2 * size + 64, np.int64)
