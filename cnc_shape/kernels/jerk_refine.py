@@ -16,12 +16,15 @@ from cnc_shape.kernels.jerk_caps import derivatives, straight_jerk
 from cnc_shape.kernels.jerk_certificate import certificate, piece_loads
 from cnc_shape.kernels.jerk_interior import KEPT, NEARER, interior
 from cnc_shape.kernels.jerk_phases import moved
+from cnc_shape.kernels.jerk_pieces import more_room
 from cnc_shape.kernels.jerk_spline import LEAST_NODES, limit_rows, spline, spline_phases, window_nodes
 
 STEP = 0.2  # -, of the time in which the acceleration rises: longest time between nodes
 LEAST_STEPS = 1.0 / 500.0  # -, of the time of a window
 LONG_CRUISE = 2.0  # -, of the time in which the acceleration rises: windows end in such a phase
 MOST_PIECES = 1500  # of a window
+NEAR_REST = 0.25  # -, of that time: what is nearer to a rest is left as it is
+STILL = 1e-6  # mm/s or rad/s
 SHORTEST_CELL = 1e-7  # mm or rad, between nodes
 ROOM_ACCELERATION = 1.0 - 1e-3  # -, of the limits that the law between its nodes may use
 ROOM_JERK = 1.0 - 4e-3
@@ -32,6 +35,7 @@ NEAR_ENDS = 8  # segments over which the room becomes less
 MOST_TRIES = 8
 LEAST_LEFT = 0.8  # -, of the room, after a try
 SHORTEST_STEP = 1e-3  # s, mean time in the cells of a window that is worth it
+SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: the jerk limit is hardly felt
 WORTH = 1e-6  # -, of its time by which a window must get shorter
 
 
@@ -45,14 +49,33 @@ def rise_time(acceleration, jerk):
 
 
 @kernel
-def window_end(pieces, cell, straight_a, begin, rise):
+def between_ends(pieces, near):
+    """First piece and the end of those that are at least the time `near` from a rest at either end."""
+    begin = 0
+    size = pieces.shape[0]
+    gone = 0.0
+    if pieces[0, 3] == 0.0:
+        while begin < size - 1 and gone + pieces[begin, 1] <= near:
+            gone += pieces[begin, 1]
+            begin += 1
+    t = pieces[size - 1, 1]
+    if abs(pieces[size - 1, 3] + t * (pieces[size - 1, 4] + t * pieces[size - 1, 5] / 2.0)) < STILL:
+        gone = 0.0
+        while size > begin + 1 and gone + pieces[size - 1, 1] <= near:
+            gone += pieces[size - 1, 1]
+            size -= 1
+    return begin, size
+
+
+@kernel
+def window_end(pieces, cell, straight_a, begin, size, rise):
     """Last piece of the window that starts in `begin`, and whether a cell of it is curved."""
     curved = False
     m = begin
     while True:
         curved = curved or straight_a[cell[m]] == 0.0
         cruise = pieces[m, 4] == 0.0 and pieces[m, 5] == 0.0 and pieces[m, 1] > LONG_CRUISE * rise
-        if m + 1 == cell.size or (m > begin and (cruise or m - begin > MOST_PIECES)):
+        if m + 1 == size or (m > begin and (cruise or m - begin > MOST_PIECES)):
             return m, curved
         m += 1
 
@@ -199,19 +222,23 @@ def refined(
     pieces, cell, rows, length, feed_rate, alone, limit_v2, straight_a, velocity, acceleration, jerk,
     tolerances,
 ):  # fmt: skip
-    """Pieces (m,6) of a law from rest to rest and their cells, where it could be made faster."""
+    """Pieces (m,6) of a law and their cells, where it could be made faster; its ends stay what they are."""
     rise = rise_time(acceleration, jerk)
-    size = cell.size
-    out = np.empty((2 * size + 64, 6))
-    out_cell = np.empty(2 * size + 64, np.int64)
+    if rise < SHORTEST_RISE:
+        return pieces, cell
+    out = np.empty((2 * cell.size + 64, 6))
+    out_cell = np.empty(2 * cell.size + 64, np.int64)
     filled = 0
-    begin = 0
+    begin, size = between_ends(pieces, NEAR_REST * rise)
+    first = begin
+    for m in range(begin):
+        filled = put_part(pieces, cell, m, 0.0, pieces[m, 1], out, out_cell, filled)
     done = 0.0  # of the piece `begin`
     while begin < size:
-        end, curved = window_end(pieces, cell, straight_a, begin, rise)
+        end, curved = window_end(pieces, cell, straight_a, begin, size, rise)
         last = end + 1 == size
-        start = 0.5 * pieces[begin, 1] if begin == 0 else max(done, pieces[begin, 1] - rise)
-        if begin > 0 and start >= pieces[begin, 1]:
+        start = 0.5 * pieces[begin, 1] if begin == first else max(done, pieces[begin, 1] - rise)
+        if begin > first and start >= pieces[begin, 1]:
             start = done
         finish = 0.5 * pieces[end, 1]
         if not last:
@@ -225,12 +252,7 @@ def refined(
             )  # fmt: skip
         needed = filled + new_cell.size + (end - begin) + 4
         if needed > out_cell.size:
-            more = np.empty((2 * needed, 6))
-            more_cell = np.empty(2 * needed, np.int64)
-            more[:filled] = out[:filled]
-            more_cell[:filled] = out_cell[:filled]
-            out = more
-            out_cell = more_cell
+            out, out_cell = more_room(out, out_cell, needed)
         if new_cell.size == 0:
             for m in range(begin, end + 1):
                 low = done if m == begin else 0.0
@@ -246,6 +268,10 @@ def refined(
                 filled = put_part(pieces, cell, end, finish, pieces[end, 1], out, out_cell, filled)
         begin = size if last else end
         done = finish
+    if filled + cell.size - size > out_cell.size:
+        out, out_cell = more_room(out, out_cell, cell.size - size)
+    for m in range(size, cell.size):
+        filled = put_part(pieces, cell, m, 0.0, pieces[m, 1], out, out_cell, filled)
     return out[:filled].copy(), out_cell[:filled].copy()
 
 

@@ -9,8 +9,8 @@ follows can be braked for. The lower of both, the envelope, only ever has *falli
 
 How far that is from optimal: not at all on straight lines; some 3 % on splines, 8 to 14 % on blends and on
 the fan. In a blend the limit of speed is taken as if the acceleration were 0, and 0 is what it is made to be
-where that limit is met; and the jerk left for an arc that rounds a step is the least of all cells it may touch.
-`kernels/jerk_refine.py` wins most of that back.
+where that limit is met; and the jerk left for an arc that rounds a step is the least of all cells it may
+touch. `kernels/jerk_refine.py` wins most of that back.
 """
 # pyright: basic
 

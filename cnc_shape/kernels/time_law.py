@@ -228,7 +228,7 @@ def forward(rows, length, stop, dwell, limit_v2, straight, acceleration, along, 
     lines = 3 * d + (ALONG_ROWS if along.size > 0 else 0)
     base = np.empty(lines)
     slope = np.empty(lines)
-    steps = np.empty((3, 4))  # duration, place, velocity, acceleration
+    steps = np.empty((4, 4))  # duration, place, velocity, acceleration
     m = 0
     x = clock[2]
     for k in range(count):
