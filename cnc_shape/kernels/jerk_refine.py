@@ -188,8 +188,8 @@ def refined_window(
     price = np.empty((n, 4, 1 + 4 * d))
     more_slack = np.empty((n, 4, 1 + 4 * d))
     more_price = np.empty((n, 4, 1 + 4 * d))
-    new = np.empty((2 * n, 6))
-    new_cell = np.empty(2 * n, np.int64)
+    made = np.empty((3 * n, 6))
+    made_cell = np.empty(3 * n, np.int64)
     worst = np.empty((straight_a.size, 7))
     curved = np.zeros(straight_a.size)
     near = 1.0
@@ -200,15 +200,18 @@ def refined_window(
         if not reached:
             return none, no_cell
         near = NEARER
-        if not spline_phases(c, place, border, centre, at, at_cell, new, new_cell):
+        count = spline_phases(c, place, border, centre, at, at_cell, made, made_cell)
+        if count == 0:
             return none, no_cell
+        new = made[:count]
+        new_cell = made_cell[:count]
         shorter = 0.0
-        for m in range(2 * n):
+        for m in range(count):
             shorter += new[m, 1]
         if not shorter < time * (1.0 - WORTH):
             return none, no_cell
         certificate(
-            new, new_cell, 0, 2 * n, curved, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
+            new, new_cell, 0, count, curved, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
             tolerances, worst,
         )  # fmt: skip
         peaks(new, new_cell, rows, feed_rate, alone, velocity, acceleration, jerk, worst)

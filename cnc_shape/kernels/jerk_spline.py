@@ -204,34 +204,61 @@ def two_phases(v0, a0, v1, a1, h1, h2, b, out):
 
 
 @kernel
+def put_phase(v, a, b, t, at, cell, pieces, cells, m):
+    """Write a piece; returns the number of pieces then."""
+    pieces[m, 0] = 0.0
+    pieces[m, 1] = t
+    pieces[m, 2] = at
+    pieces[m, 3] = v
+    pieces[m, 4] = a
+    pieces[m, 5] = b
+    cells[m] = cell
+    return m + 1
+
+
+@kernel
 def spline_phases(c, place, border, centre, at, at_cell, pieces, cell):
-    """Phases of a spline as pieces (2 n,6), two for every node: whether they are found."""
+    """Phases of a spline as pieces (m,6), two for every segment, cut at the nodes; 0 where there are none."""
     n = place.size
     out = np.empty(6)
+    filled = 0
     for s in range(n):
         slope = (c[s + 1] - c[s]) / (centre[s + 1] - centre[s])
         end_slope = (c[s + 2] - c[s + 1]) / (centre[s + 2] - centre[s + 1])
         x = c[s] + slope * (border[s] - centre[s])
         end_x = c[s + 1] + end_slope * (border[s + 1] - centre[s + 1])
         if not (x > 0.0 and end_x > 0.0):
-            return False
+            return 0
         v = np.sqrt(x)
         end_v = np.sqrt(end_x)
-        middle = place[s] if 0 < s < n - 1 else 0.5 * (border[s] + border[s + 1])
-        b = 0.25 * (end_slope - slope) / (border[s + 1] - border[s]) * (v + end_v)
-        found = two_phases(
-            v, 0.5 * slope, end_v, 0.5 * end_slope, middle - border[s], border[s + 1] - middle, b, out
-        )
-        if not found:
-            return False
-        for half in range(2):
-            k = max(s - 1, 0) if half == 0 else min(s, n - 2)
-            m = 2 * s + half
-            pieces[m, 0] = 0.0
-            pieces[m, 1] = out[4 * half]
-            pieces[m, 2] = at[k] + ((border[s] if half == 0 else middle) - place[k])
-            pieces[m, 3] = v if half == 0 else out[2]
-            pieces[m, 4] = 0.5 * slope if half == 0 else out[3]
-            pieces[m, 5] = out[1 + 4 * half]
-            cell[m] = at_cell[k]
-    return True
+        half = 0.5 * (border[s + 1] - border[s])
+        b = 0.25 * (end_slope - slope) / (2.0 * half) * (v + end_v)
+        if not two_phases(v, 0.5 * slope, end_v, 0.5 * end_slope, half, half, b, out):
+            return 0
+        before = max(s - 1, 0)
+        own = at_cell[before]
+        here = at[before] + (border[s] - place[before])
+        left = place[s] - border[s] if 0 < s < n - 1 else np.inf  # to the node
+        for part in range(2):
+            t = out[4 * part]
+            b = out[1 + 4 * part]
+            v = np.sqrt(x) if part == 0 else out[2]
+            a = 0.5 * slope if part == 0 else out[3]
+            begin = 0.0
+            if left <= half:
+                if left > 0.0:
+                    begin, v1, a1 = after(v, a, b, left, t * left / half)
+                    filled = put_phase(v, a, b, begin, here, own, pieces, cell, filled)
+                    v = v1
+                    a = a1
+                own = at_cell[s]
+                here = at[s]
+                left = half - left
+                filled = put_phase(v, a, b, t - begin, here, own, pieces, cell, filled)
+                here += left
+                left = np.inf
+            else:
+                filled = put_phase(v, a, b, t, here, own, pieces, cell, filled)
+                here += half
+                left -= half
+    return filled
