@@ -13,7 +13,7 @@ import numpy as np
 
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_caps import derivatives, straight_jerk
-from cnc_shape.kernels.jerk_certificate import certificate, piece_loads
+from cnc_shape.kernels.jerk_certificate import certificate
 from cnc_shape.kernels.jerk_interior import KEPT, NEARER, interior
 from cnc_shape.kernels.jerk_phases import moved
 from cnc_shape.kernels.jerk_pieces import more_room
@@ -35,7 +35,7 @@ NEAR_ENDS = 8  # segments over which the room becomes less
 MOST_TRIES = 8
 LEAST_LEFT = 0.8  # -, of the room, after a try
 SHORTEST_STEP = 1e-3  # s, mean time in the cells of a window that is worth it
-SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: the jerk limit is hardly felt
+SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: with less the jerk limit is hardly felt
 WORTH = 1e-6  # -, of its time by which a window must get shorter
 
 
@@ -111,23 +111,18 @@ def less_room(worst, at_cell, tolerances, room, cap):
 
 
 @kernel
-def peaks(pieces, cell, rows, feed_rate, alone, velocity, acceleration, jerk, worst):
-    """Raise the ratios of velocity and feed to those where the speed is highest within a piece."""
-    loads = np.empty(4)
+def peaks(pieces, cell, limit_v2, worst):
+    """Raise the ratios of velocity to those of the highest speeds of the pieces to what their cells allow."""
     for m in range(cell.size):
         v = pieces[m, 3]
         a = pieces[m, 4]
         b = pieces[m, 5]
-        if a > 0.0 and a + b * pieces[m, 1] < 0.0:
-            k = cell[m]
-            t = -a / b
-            loads[:] = 0.0
-            piece_loads(
-                rows[k], alone[k], pieces[m, 2] + moved(v, a, b, t), v + 0.5 * a * t, 0.0, 0.0, velocity,
-                acceleration, jerk, feed_rate[k], loads,
-            )  # fmt: skip
-            worst[k, 0] = max(worst[k, 0], loads[0])
-            worst[k, 2] = max(worst[k, 2], loads[3])
+        k = cell[m]
+        end_a = a + b * pieces[m, 1]
+        most = max(v, v + 0.5 * (a + end_a) * pieces[m, 1])
+        if a > 0.0 and end_a < 0.0:
+            most = v - 0.5 * a * a / b
+        worst[k, 0] = max(worst[k, 0], most / np.sqrt(min(limit_v2[k, 0], limit_v2[k, 1])))
 
 
 @kernel
@@ -214,7 +209,7 @@ def refined_window(
             new, new_cell, 0, count, curved, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
             tolerances, worst,
         )  # fmt: skip
-        peaks(new, new_cell, rows, feed_rate, alone, velocity, acceleration, jerk, worst)
+        peaks(new, new_cell, limit_v2, worst)
         if less_room(worst, at_cell, tolerances, room, cap) == 0:
             return new, new_cell
     return none, no_cell
