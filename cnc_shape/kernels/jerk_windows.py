@@ -88,13 +88,17 @@ def last_joint(pieces, cell, cap, count):
 
 @kernel
 def calm_cells(rows, length, limit_v2, acceleration, jerk, pieces, cell, begin, end, wide):
-    """Cells about the node of the least acceleration, counted from `begin`, and the speed to keep there."""
+    """Cells about the node of the least acceleration, counted from `begin`, and the speed to keep there.
+
+    In a window of less than a few stopping distances it is the node of the highest speed.
+    """
     count = end - begin
     first_piece = np.zeros(count + 1, np.int64)
     index_pieces(cell, cell.size, first_piece, count)
     covered = 0.0
     node = 0
     least = np.inf
+    fastest = 0.0
     for k in range(count - 1, count // 4, -1):
         v = np.sqrt(max(limit_v2[begin + k, 0], limit_v2[begin + k, 1]))
         distance, _ = stopping_distance(rows[begin + k], length[begin + k], v, acceleration, jerk)
@@ -103,11 +107,14 @@ def calm_cells(rows, length, limit_v2, acceleration, jerk, pieces, cell, begin, 
         if covered >= CALM_AHEAD and a < least and pieces[first_piece[k], 3] > 0.0:
             least = a
             node = k
+        if least == np.inf and pieces[first_piece[k], 3] > fastest:
+            fastest = pieces[first_piece[k], 3]
+            node = k
     if node == 0:
         return 0, 0, 0.0
     v = pieces[first_piece[node], 3]
     _, b = stopping_distance(rows[begin + node], length[begin + node], v, acceleration, jerk)
-    reach = wide * v * least / b
+    reach = wide * v * abs(pieces[first_piece[node], 4]) / b
     low = node - 1
     high = node + 1
     far = length[begin + low]
