@@ -12,7 +12,7 @@ are planned anew, and where a window has no law between the speeds at its ends, 
 
 import numpy as np
 
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined, kernel
 from cnc_shape.kernels.jerk_caps import derivatives, falling_jerk, speed_caps, straight_jerk, tighten
 from cnc_shape.kernels.jerk_certificate import certificate
 from cnc_shape.kernels.jerk_phases import moved
@@ -83,7 +83,7 @@ def window_law(
     return pieces[:m], cell[:m]
 
 
-@kernel
+@inlined
 def joint_speed(pieces, first_piece, cap, node, cells):
     """Speed at a node where the law may be joined; -1 where it may not."""
     if node == 0 or node == cells:
@@ -101,7 +101,7 @@ def joint_speed(pieces, first_piece, cap, node, cells):
     return v
 
 
-@kernel
+@inlined
 def joint_before(pieces, first_piece, cap, node, cells):
     """The nearest node at or before `node` where the law may be joined, and its speed there."""
     while True:
@@ -111,7 +111,7 @@ def joint_before(pieces, first_piece, cap, node, cells):
         node -= 1
 
 
-@kernel
+@inlined
 def joint_after(pieces, first_piece, cap, node, cells):
     """The nearest node at or after `node` where the law may be joined, and its speed there."""
     while True:
@@ -169,8 +169,8 @@ def section_law(
     if cell.size == 0:
         return pieces, cell, work, count
     certificate(
-        pieces, cell, 0, cell.size, straight_a, top, rows, begin, feed_rate, alone, velocity, acceleration,
-        jerk, tolerances, worst,
+        pieces, cell, 0, cell.size, straight_a, rows, begin, feed_rate, alone, velocity, acceleration, jerk,
+        tolerances, worst,
     )  # fmt: skip
     found = tighten(worst, straight_a, tolerances, ease, lower, changed, 0, count)
     first_piece = np.zeros(count + 1, np.int64)
@@ -243,7 +243,7 @@ def section_law(
             low = windows[n, 0]
             high = windows[n, 1]
             certificate(
-                pieces, cell, first_piece[low], first_piece[high], straight_a, top, rows, begin, feed_rate,
+                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
                 alone, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
