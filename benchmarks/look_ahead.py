@@ -124,9 +124,9 @@ def raster(blocks: int) -> Points:
 
 
 def spiral(blocks: int) -> Points:
-    """Points (blocks+1,3) of a flat spiral outwards, 0.5 mm a turn."""
+    """Points (blocks+1,3) of a flat spiral outwards from radius 28 mm, 0.5 mm a turn."""
     growth = 0.5 / (2.0 * np.pi)  # mm/rad
-    angle = np.sqrt(2.0 * (5.0 + 0.1 * np.arange(blocks + 1)) / growth)
+    angle = np.sqrt(2.0 * (5000.0 + 0.1 * np.arange(blocks + 1)) / growth)
     return np.column_stack([growth * angle * np.cos(angle), growth * angle * np.sin(angle), 0.0 * angle])
 
 
@@ -152,8 +152,9 @@ def shape_path(shape: str, blocks: int) -> SmoothPath:
     whole = np.zeros(n, np.int64)
     program = Program(
         source="", axes=("x", "y", "z"), start=frozen(points[0]),
-        motion=frozen_integers(whole + int(Motion.FEED)), target=frozen(points[1:]), center=frozen(np.zeros((n, 3))),
-        normal=frozen(np.tile([0.0, 0.0, 1.0], (n, 1))), sweep=frozen(np.zeros(n)), feed_rate=frozen(np.full(n, 100.0)),
+        motion=frozen_integers(whole + int(Motion.FEED)), target=frozen(points[1:]),
+        center=frozen(np.zeros((n, 3))), normal=frozen(np.tile([0.0, 0.0, 1.0], (n, 1))),
+        sweep=frozen(np.zeros(n)), feed_rate=frozen(np.full(n, 100.0)),
         dwell=frozen(np.zeros(n)), path_mode=frozen_integers(whole + int(PathMode.BLEND)),
         path_tolerance=frozen(np.full(n, np.nan)), merge_tolerance=frozen(np.full(n, np.nan)),
         line=frozen_integers(np.arange(1, n + 1)),

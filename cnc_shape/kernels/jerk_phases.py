@@ -6,7 +6,6 @@ import numpy as np
 from cnc_shape.kernels import inlined, kernel
 
 MOST_STEPS = 60  # of a Newton iteration or a bisection
-NEAR_ENOUGH = 1e-9  # -, a step of Newton's method after which nothing is left but rounding
 
 
 @kernel
@@ -26,9 +25,10 @@ def travel_time(v, a, b, h):
         step = (t * (v + t * (a / 2.0 + t * b / 6.0)) - h) / (v + t * (a + t * b / 2.0))
         if not step > 0.0:
             break
-        t -= step
-        if step <= NEAR_ENOUGH * t:
+        lower = t - step
+        if lower >= t:
             break
+        t = lower
     return t
 
 

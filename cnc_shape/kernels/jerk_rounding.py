@@ -15,11 +15,12 @@ therefore the one; where it finds none, the gap decides by bisection.
 import numpy as np
 
 from cnc_shape.kernels import kernel
-from cnc_shape.kernels.jerk_phases import MOST_STEPS, NEAR_ENOUGH, moved, put, time_to
+from cnc_shape.kernels.jerk_phases import MOST_STEPS, moved, put, time_to
 
 SHORTEST = 1e-12  # s, a shorter phase is rounding
 NO_KINK = 1e-9  # s, times the jerk: a smaller step of acceleration is rounding
 NEWTON_STEPS = 12
+LAST_STEP = 1e-15  # -, of the phases: after it nothing is left but rounding
 ROUNDING = 1e-13  # -, of places and speeds
 POP, TANGENT, END = 0, 1, 2  # what an arc does: passes below P, touches Q, meets the end of Q
 
@@ -49,7 +50,7 @@ def tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
             return False, t1, t2, t
         t1 -= step1
         t2 -= step2
-        if abs(step1) + abs(step2) <= NEAR_ENOUGH * (tp + tq):
+        if abs(step1) + abs(step2) <= LAST_STEP * (tp + tq):
             break
     slack = 1e-13 * (tp + tq)
     if not (-slack <= t1 <= tp + slack and -slack <= t2 <= tq + slack):
@@ -93,7 +94,7 @@ def through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
             return False, t1, t
         t1 -= step1
         t -= step
-        if abs(step1) + abs(step) <= NEAR_ENOUGH * (tp + abs(t)):
+        if abs(step1) + abs(step) <= LAST_STEP * (tp + abs(t)):
             break
     slack = 1e-13 * (tp + abs(t))
     if not (-slack <= t1 <= tp + slack and t >= 0.0):
@@ -157,7 +158,7 @@ def highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
         following = t2 - gap / slope if slope > 0.0 else 0.5 * (low + high)
         if not low < following < high:
             following = 0.5 * (low + high)
-        near = abs(following - t2) <= NEAR_ENOUGH * tq
+        near = abs(following - t2) <= 10.0 * LAST_STEP * tq
         t2 = following
         if near:
             break
