@@ -117,12 +117,12 @@ def along_ratio(rows, along, s, v, a, b, t):
 
 @kernel
 def looked_at(
-    pieces, cell, first_piece, last_piece, straight_a, top, rows, begin, feed_rate, alone, along, velocity,
+    pieces, cell, first_piece, last_piece, straight_a, rows, begin, feed_rate, alone, along, velocity,
     acceleration, jerk, tolerances, worst,
 ):  # fmt: skip
     """The certificate of pieces of a law (`jerk_certificate.certificate`), with that along the path."""
     certificate(
-        pieces, cell, first_piece, last_piece, straight_a, top, rows, begin, feed_rate, alone, velocity,
+        pieces, cell, first_piece, last_piece, straight_a, rows, begin, feed_rate, alone, velocity,
         acceleration, jerk, tolerances, worst,
     )  # fmt: skip
     if along.size == 0:

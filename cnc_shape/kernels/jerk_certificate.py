@@ -15,10 +15,9 @@ import numpy as np
 from cnc_shape.kernels import inlined, kernel
 from cnc_shape.kernels.jerk_phases import moved
 
-POINTS = 9  # of a piece at which velocity, acceleration and feed are looked at in planning
+POINTS = 9  # of a piece at which the jerk by curvature is looked at
 SMALLEST_SHARE = 1.0 / 64.0  # -, of a piece that is halved
 UNSURE = 1e-3  # -, of the limit, between the bound of an excess and what is there for sure
-AT_TOP = 1e-12  # -, by which the speed may exceed its cap by rounding
 
 
 @inlined
@@ -100,32 +99,16 @@ def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, w
 
 
 @kernel
-def largest_at_points(c, alone, piece, velocity, acceleration, jerk, feed_rate, loads):
-    """Largest ratios (4,) of velocity, acceleration, jerk but for b, and feed at points of a piece."""
-    loads[:] = 0.0
-    v = piece[3]
-    a = piece[4]
-    b = piece[5]
-    for n in range(POINTS):
-        e = piece[1] * n / (POINTS - 1)
-        piece_loads(
-            c, alone, piece[2] + moved(v, a, b, e), v + e * (a + e * b / 2.0), a + e * b, 0.0, velocity,
-            acceleration, jerk, feed_rate, loads,
-        )  # fmt: skip
-
-
-@kernel
 def certificate(
-    pieces, cell, begin, end, straight_a, top, rows, first_cell, feed_rate, alone, velocity, acceleration,
-    jerk, tolerances, worst,
+    pieces, cell, begin, end, straight_a, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk,
+    tolerances, worst,
 ):  # fmt: skip
     """Largest ratios (k,7) of what the law asks for to the limits, in the cells of pieces `begin` to `end`.
 
     Velocity, acceleration, feed; jerk where the path jerk b is 0, where it is positive, where it is
     negative; jerk but for that by b. Acceleration and jerks are bounds, as near as it takes to tell them
-    from what is tolerated. Velocity and feed are looked for at some points of pieces faster than the `top`
-    speed of their cell, jerk but for b in cells with too much jerk. Straight cells keep their limits by
-    construction.
+    from what is tolerated; jerk but for b is looked for at some points of the pieces of cells with too much.
+    Velocity and feed are 0: a law stays below the envelope, which keeps them. So do straight cells theirs.
     """
     loads = np.empty(4)
     m = begin
@@ -137,34 +120,33 @@ def certificate(
             m += 1
         if straight_a[k] > 0.0:
             continue
-        c = rows[first_cell + k]
+        whole = first_cell + k
+        most = 0.0
         for n in range(first, m):
-            s = pieces[n, 2]
-            v = pieces[n, 3]
-            a = pieces[n, 4]
             b = pieces[n, 5]
-            t = pieces[n, 1]
             most_a, most_j = largest_loads(
-                c, s, v, a, b, t, acceleration, jerk, 1.0 + tolerances[1], 1.0 + tolerances[2]
-            )
+                rows[whole], pieces[n, 2], pieces[n, 3], pieces[n, 4], b, pieces[n, 1], acceleration, jerk,
+                1.0 + tolerances[1], 1.0 + tolerances[2],
+            )  # fmt: skip
             worst[k, 1] = max(worst[k, 1], most_a)
             kind = 3 if b == 0.0 else (4 if b > 0.0 else 5)
             worst[k, kind] = max(worst[k, kind], most_j)
-            fastest = max(v, v + t * (a + t * b / 2.0)) + max(0.0, -b * t * t / 8.0)
-            if fastest > top[k] * (1.0 + AT_TOP):
-                whole = first_cell + k
-                largest_at_points(
-                    c, alone[whole], pieces[n], velocity, acceleration, jerk, feed_rate[whole], loads
-                )
-                worst[k, 0] = max(worst[k, 0], loads[0])
-                worst[k, 2] = max(worst[k, 2], loads[3])
-        if max(worst[k, 3], max(worst[k, 4], worst[k, 5])) > 1.0 + tolerances[2]:
-            whole = first_cell + k
-            for n in range(first, m):
-                largest_at_points(
-                    c, alone[whole], pieces[n], velocity, acceleration, jerk, feed_rate[whole], loads
-                )
-                worst[k, 6] = max(worst[k, 6], loads[2])
+            most = max(most, most_j)
+        if most <= 1.0 + tolerances[2]:
+            continue
+        loads[:] = 0.0
+        for n in range(first, m):
+            v = pieces[n, 3]
+            a = pieces[n, 4]
+            b = pieces[n, 5]
+            for p in range(POINTS):
+                e = pieces[n, 1] * p / (POINTS - 1)
+                piece_loads(
+                    rows[whole], alone[whole], pieces[n, 2] + moved(v, a, b, e),
+                    v + e * (a + e * b / 2.0), a + e * b, 0.0, velocity, acceleration, jerk,
+                    feed_rate[whole], loads,
+                )  # fmt: skip
+        worst[k, 6] = loads[2]
 
 
 @kernel

@@ -12,7 +12,7 @@ are planned anew, and where a window has no law between the speeds at its ends, 
 
 import numpy as np
 
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined, kernel
 from cnc_shape.kernels.jerk_caps import falling_jerk, speed_caps, tighten
 from cnc_shape.kernels.jerk_cells import looked_at, prepared
 from cnc_shape.kernels.jerk_phases import moved
@@ -83,7 +83,7 @@ def window_law(
     return pieces[:m], cell[:m]
 
 
-@kernel
+@inlined
 def joint_speed(pieces, first_piece, cap, node, cells, start):
     """Speed at a node where the law may be joined; -1 where it may not."""
     if node == 0:
@@ -103,7 +103,7 @@ def joint_speed(pieces, first_piece, cap, node, cells, start):
     return v
 
 
-@kernel
+@inlined
 def joint_before(pieces, first_piece, cap, node, cells, start):
     """The nearest node at or before `node` where the law may be joined, and its speed there."""
     while True:
@@ -113,7 +113,7 @@ def joint_before(pieces, first_piece, cap, node, cells, start):
         node -= 1
 
 
-@kernel
+@inlined
 def joint_after(pieces, first_piece, cap, node, cells, start):
     """The nearest node at or after `node` where the law may be joined, and its speed there."""
     while True:
@@ -240,7 +240,7 @@ def section_law(
             low = windows[n, 0]
             high = windows[n, 1]
             looked_at(
-                pieces, cell, first_piece[low], first_piece[high], straight_a, top, rows, begin, feed_rate,
+                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
                 alone, along, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)

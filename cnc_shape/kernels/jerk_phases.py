@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined, kernel
 
 MOST_STEPS = 60  # of a Newton iteration or a bisection
 
@@ -17,10 +17,10 @@ def travel_time(v, a, b, h):
     t = np.inf
     if v > 0.0:
         t = min(t, h / v)
-    if a > 0.0:
-        t = min(t, np.sqrt(2.0 * h / a))
-    if b > 0.0:
-        t = min(t, np.cbrt(6.0 * h / b))
+    if a * t * t > 2.0 * h:
+        t = np.sqrt(2.0 * h / a)
+    if b * t * t * t > 6.0 * h:
+        t = np.cbrt(6.0 * h / b)
     for _ in range(MOST_STEPS):
         step = (t * (v + t * (a / 2.0 + t * b / 6.0)) - h) / (v + t * (a + t * b / 2.0))
         if not step > 0.0:
@@ -32,7 +32,7 @@ def travel_time(v, a, b, h):
     return t
 
 
-@kernel
+@inlined
 def moved(v, a, b, t):
     """Distance after `t`."""
     return t * (v + t * (a / 2.0 + t * b / 6.0))
@@ -54,13 +54,13 @@ def time_to(v, a, b, most, h):
         following = t - gap / speed if speed > 0.0 else 0.5 * (low + high)
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        if abs(following - t) <= 1e-16 * most or following == t:
+        if abs(following - t) <= 1e-15 * most:
             return following
         t = following
     return t
 
 
-@kernel
+@inlined
 def speed_at(phases, low, high, place):
     """Phase among `low` to `high` in which `place` lies, the time in it, and the speed."""
     n = low
@@ -70,14 +70,14 @@ def speed_at(phases, low, high, place):
     return n, t, phases[n, 2] + t * (phases[n, 3] + t * phases[n, 4] / 2.0)
 
 
-@kernel
+@inlined
 def last_speed(phases, n):
     """Speed at the end of a phase."""
     t = phases[n, 0]
     return phases[n, 2] + t * (phases[n, 3] + t * phases[n, 4] / 2.0)
 
 
-@kernel
+@inlined
 def put(phases, cell, m, t, place, v, a, b, k):
     """Write a phase."""
     phases[m, 0] = t

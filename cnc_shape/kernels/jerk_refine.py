@@ -206,7 +206,7 @@ def refined_window(
         if not shorter < time * (1.0 - WORTH):
             return none, no_cell
         certificate(
-            new, new_cell, 0, count, curved, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
+            new, new_cell, 0, count, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
             tolerances, worst,
         )  # fmt: skip
         peaks(new, new_cell, limit_v2, worst)

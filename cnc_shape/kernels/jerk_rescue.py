@@ -78,7 +78,7 @@ def slow_law(
     m = cut(law, law_cell, w, nodes, 0, pieces, cell)
     worst = np.zeros((count, 7))
     looked_at(
-        pieces, cell, 0, m, straight_a, np.zeros(count), rows, begin, feed_rate, alone, along, velocity, acceleration,
+        pieces, cell, 0, m, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
         jerk, tolerances, worst,
     )  # fmt: skip
     share = 1.0

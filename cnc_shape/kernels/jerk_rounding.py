@@ -20,7 +20,7 @@ from cnc_shape.kernels.jerk_phases import MOST_STEPS, moved, put, time_to
 SHORTEST = 1e-12  # s, a shorter phase is rounding
 NO_KINK = 1e-9  # s, times the jerk: a smaller step of acceleration is rounding
 NEWTON_STEPS = 12
-NEAR_ENOUGH = 1e-14  # -, of a phase, to the place where an arc is highest
+LAST_STEP = 1e-15  # -, of the phases: after it nothing is left but rounding
 ROUNDING = 1e-13  # -, of places and speeds
 POP, TANGENT, END = 0, 1, 2  # what an arc does: passes below P, touches Q, meets the end of Q
 
@@ -50,7 +50,7 @@ def tangent(vp, ap, bp, tp, uq, vq, aq, bq, tq, jerk, t1, t2):
             return False, t1, t2, t
         t1 -= step1
         t2 -= step2
-        if abs(step1) + abs(step2) <= 1e-15 * (tp + tq):
+        if abs(step1) + abs(step2) <= LAST_STEP * (tp + tq):
             break
     slack = 1e-13 * (tp + tq)
     if not (-slack <= t1 <= tp + slack and -slack <= t2 <= tq + slack):
@@ -94,7 +94,7 @@ def through(vp, ap, bp, tp, ue, ve, ae, jerk, t1, t):
             return False, t1, t
         t1 -= step1
         t -= step
-        if abs(step1) + abs(step) <= 1e-15 * (tp + abs(t)):
+        if abs(step1) + abs(step) <= LAST_STEP * (tp + abs(t)):
             break
     slack = 1e-13 * (tp + abs(t))
     if not (-slack <= t1 <= tp + slack and t >= 0.0):
@@ -158,9 +158,10 @@ def highest(vp, ap, bp, uq, vq, aq, bq, tq, jerk, t1):
         following = t2 - gap / slope if slope > 0.0 else 0.5 * (low + high)
         if not low < following < high:
             following = 0.5 * (low + high)
-        if abs(following - t2) <= NEAR_ENOUGH * tq:
-            break
+        near = abs(following - t2) <= 10.0 * LAST_STEP * tq
         t2 = following
+        if near:
+            break
     t = min(max((a1 - aq - bq * t2) / jerk, 0.0), rest)
     return v1 + t * (a1 - t * jerk / 2.0) - (vq + t2 * (aq + t2 * bq / 2.0)), t, t2, False
 

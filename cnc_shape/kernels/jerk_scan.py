@@ -20,7 +20,7 @@ from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_caps import curved_caps
 from cnc_shape.kernels.jerk_phases import MOST_STEPS, last_speed, moved, put, speed_at, travel_time
 
-NEAR_ENOUGH = 1e-15  # -, of a cell, to the place where two laws cross
+CROSSED = 1e-14  # -, of a cell, to the place where two laws cross
 PHASES = 4  # of a scan in one cell, at most
 
 
@@ -237,7 +237,7 @@ def crossing(rising, r, r_end, falling, f, f_end, h):
             high = place
         slope = (rising[n, 3] + t * rising[n, 4]) / up - (falling[m, 3] + s * falling[m, 4]) / down
         step = gap / slope
-        if abs(step) <= NEAR_ENOUGH * h:
+        if abs(step) <= CROSSED * h:
             return place
         place -= step
     return low
