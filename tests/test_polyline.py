@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from paths import arc, dwell, line, toolpath
 
 from cnc_shape.kernels.chords import WINDOW
-from cnc_shape.kernels.polyline import EXACT_PATH_TOLERANCE, LARGEST_STEP
+from cnc_shape.kernels.polyline import ARC_SHARE, EXACT_PATH_TOLERANCE, LARGEST_STEP
 from cnc_shape.polyline import Merging, Polyline, join, polyline
 from cnc_shape.program import PathMode
 
@@ -28,7 +28,7 @@ def polygon_error(edges: Polyline, radius: float) -> float:
 
 @pytest.mark.parametrize("radius", [0.05, 1.0, 30.0, 1000.0])
 @pytest.mark.parametrize("sweep", [0.01, -1.0, 2 * np.pi, -15.0])
-def test_a_polygon_about_an_arc_is_tangent_at_its_ends_and_outside_by_a_quarter(radius, sweep):
+def test_a_polygon_about_an_arc_is_tangent_at_its_ends_and_outside_by_its_share(radius, sweep):
     end = (radius * np.cos(sweep), radius * np.sin(sweep), 0.0)
     edges = straighten(toolpath(arc(end, (0.0, 0.0, 0.0), sweep), start=(radius, 0.0, 0.0)))
     assert_array_equal(edges.start[0], [radius, 0.0, 0.0])
@@ -37,7 +37,7 @@ def test_a_polygon_about_an_arc_is_tangent_at_its_ends_and_outside_by_a_quarter(
     assert_allclose(first / np.linalg.norm(first), [0.0, np.sign(sweep), 0.0], atol=1e-9 / min(radius, 1.0))
     tangent = np.sign(sweep) * np.array([-np.sin(sweep), np.cos(sweep), 0.0])
     assert_allclose(last / np.linalg.norm(last), tangent, atol=1e-8 / min(radius, 1.0))
-    assert 0.0 <= polygon_error(edges, radius) <= 0.25 * MERGING.path_tolerance * (1 + 0.05)
+    assert 0.0 <= polygon_error(edges, radius) <= 3 * ARC_SHARE * MERGING.path_tolerance * (1 + 0.05)
     assert_allclose(MERGING.path_tolerance - edges.tolerance[0], polygon_error(edges, radius), atol=1e-12)
     assert_allclose(edges.place[-1], radius * abs(sweep), rtol=1e-12)
     assert_allclose(edges.travel.sum(), radius * abs(sweep), rtol=1e-12)
@@ -52,9 +52,12 @@ def test_corners_of_a_polygon_are_where_the_tangents_meet(radius, sweep, rise):
     corners = naive.tangent_polygon(radius, rise, sweep, len(edges) - 1)
     assert_allclose(edges.start[1:-1], corners, atol=1e-11)
     count = len(corners)
-    if count > 1 and not rise:  # no more than it takes: one fewer would spend more than a quarter
+    if count > 1 and not rise:  # no more than it takes: one fewer would spend more than its share
         step = abs(sweep) / (count - 1)
-        assert step > LARGEST_STEP or radius * (1 / np.cos(0.5 * step) - 1) > 0.25 * MERGING.path_tolerance
+        assert (
+            step > LARGEST_STEP
+            or radius * (1 / np.cos(0.5 * step) - 1) > 3 * ARC_SHARE * MERGING.path_tolerance
+        )
 
 
 @settings(max_examples=60)

@@ -130,6 +130,18 @@ def test_cells_are_the_sum_over_all_hats():
     assert_allclose(q[:-4], slow, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("tolerance", [0.005, 0.01, 0.1])
+def test_an_arc_is_curved_evenly(tolerance):
+    """Hats as wide as a whole number of edges add up to a constant: away from its ends there is no ripple."""
+    path = path_of(toolpath(arc((5, 0, 0), (0, 0, 0), 2 * np.pi), start=(5.0, 0.0, 0.0)), tolerance)
+    inner = slice(len(path) // 3, 2 * len(path) // 3)
+    start = 2 * path.coefficients[inner, 2]
+    end = start + 6 * path.length[inner, None] * path.coefficients[inner, 3]
+    curvature = np.linalg.norm([start, end], axis=2)
+    assert np.ptp(curvature) <= 0.02 * curvature.mean()
+    assert_allclose(curvature.mean(), 0.2, rtol=0.02)
+
+
 def test_stops_and_ends_are_exact():
     for mode in (PathMode.EXACT_STOP, PathMode.EXACT_PATH):
         path = path_of(lines(SQUARE, mode=mode))

@@ -21,6 +21,7 @@ COLLINEAR = 1e-12  # -, a smaller step of the tangent is rounding
 LONGEST_BLEND = 20.0  # mm, half-width of the widest hat
 LONGEST_BLEND_RATIO = 300.0  # -, the same over the tolerance
 ROTARY_BLEND_TOLERANCE = 9e-4  # rad, deviation of a rotary axis by rounding
+SAME_EDGE = 1e-6  # -, difference of edges that are equal
 ROUNDS = 9  # of fitting the widths; the last is a guarantee
 SHRINK = 0.999
 
@@ -121,6 +122,18 @@ def first_widths(u, tolerance, turn, twist, stop):
 
 
 @kernel
+def in_step(u, width, stop):
+    """Shorten widths, in ticks, to whole multiples of edges that are equal: on the polygon of an arc.
+
+    Triangles that wide add up to a constant; any other width lets the curvature of an arc ripple.
+    """
+    for k in range(1, u.size - 1):
+        edge = u[k] - u[k - 1]
+        if stop[k] == 0 and width[k] >= edge and abs(u[k + 1] - u[k] - edge) <= SAME_EDGE * edge:
+            width[k] -= width[k] % edge
+
+
+@kernel
 def widths(u, tolerance, turn, twist, stop):
     """Half-widths (n,) of the hats in ticks, such that the path stays within the edges' tolerances.
 
@@ -184,6 +197,7 @@ def widths(u, tolerance, turn, twist, stop):
         for i in range(n):
             if width[i] > 0 and turn[i] + twist[i] > 0.0 and size[i] < 1.0:
                 width[i] = np.int64(width[i] * size[i])
+    in_step(u, width, stop)
     segment = 0
     for k in range(1, n + 1):
         if k == n or stop[k] == 1:

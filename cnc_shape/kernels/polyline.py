@@ -11,7 +11,8 @@ EXACT_STOP = 0  # PathMode
 BLEND = 2
 
 LARGEST_STEP = 0.35  # rad, angle of a polygon's edge seen from the arc's centre
-ARC_SHARE = 1.0 / 12.0  # the polygon's unit of error as a share of the path tolerance; it uses three of them
+ARC_SHARE = 1.0 / 14.0  # the polygon's unit of error as a share of the path tolerance; it uses three of them,
+# and hats as wide as two edges use ten
 NO_TRAVEL = 1e-9  # mm, a move with less XYZ travel that turns rotary axes is rotary-only
 COS_REVERSAL = -0.9659258262890683  # cos 165 degrees
 EXACT_PATH_TOLERANCE = 1e-3  # mm, transition where an exact path bends without a corner
