@@ -206,6 +206,7 @@ def windows_law(
             end = begin + most
             rests = True
         entry = speeds[1] if marks[0] > 0 else 0.0
+        known = 0  # joint from which the law has been sought in vain
         pieces, cell, cap, work, found = section_law(
             rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin,
             end, entry, 0, 0, 0.0, tolerances, most_rounds,
@@ -217,6 +218,7 @@ def windows_law(
         elif found > 0 and marks[0] > 0:
             counts[MERGED] += 1
             entry = speeds[0]
+            known = marks[0]
             pieces, cell, cap, work, found = section_law(
                 rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
                 end, entry, 0, 0, 0.0, tolerances, most_rounds,
@@ -250,7 +252,7 @@ def windows_law(
         joint, speed = last_joint(pieces, cell, cap, end - at)
         wide = 1.0
         for _ in range(CALM_TRIES):
-            if joint > 0:
+            if joint > known:
                 break
             low, high, calm = calm_cells(
                 rows, length, limit_v2, acceleration, jerk, pieces, cell, at, end, wide
@@ -266,10 +268,10 @@ def windows_law(
             counts[PLANNED] += work
             if found == 0:
                 joint, speed = last_joint(calmed, calmed_cell, calmed_cap, end - at)
-                if joint > 0:
+                if joint > known:
                     pieces = calmed
                     cell = calmed_cell
-        if joint == 0:
+        if joint <= known:
             counts[RESTS] += 1
             out, out_cell, filled = released(pieces, cell, end - at, at, out, out_cell, filled)
             at = end
