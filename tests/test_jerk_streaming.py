@@ -85,7 +85,10 @@ def test_a_law_that_is_always_on_its_way_up_is_kept_at_one_speed_for_a_moment():
     parts, counts, _ = in_chunks(path, MILL_J, 300)
     assert counts[CALMED] > 10 * counts[RESTS]
     assert_same_law(parts, plan(path, MILL_J))
-    assert_keeps(plan(path, MILL_J), MILL_J)
+    found = worst_violation(plan(path, MILL_J), MILL_J, 33)
+    assert found.worst <= 1e-6
+    assert found.jerk <= 1e-3
+    assert max(found.gap, found.jump) <= 1e-8  # at 64 joints a mm, rounding of each
 
 
 @pytest.mark.usefixtures("small_windows")
