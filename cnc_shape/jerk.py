@@ -49,7 +49,7 @@ class JerkState:
     held_cell: IntArray  # (m,)
     marks: IntArray  # (2,) cells of it up to its joint, and up to its end; 0: there is none
     speeds: FloatArray  # (2,) at its start and at its joint
-    counts: IntArray  # (5,) what planning has done so far (`kernels/jerk_windows.py`)
+    counts: IntArray  # (6,) what planning has done so far (`kernels/jerk_windows.py`)
 
 
 JerkStep: TypeAlias = Callable[[JerkState | None, Path, bool], tuple[JerkState | None, Profile]]
@@ -121,5 +121,5 @@ def _profile(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
 _NO_PIECES, _NO_CELLS = np.empty((0, 6)), np.empty(0, np.int64)
 _START = JerkState(
     (), frozen(np.zeros(2)), 0, 0, frozen(_NO_PIECES), frozen_integers(_NO_CELLS),
-    frozen_integers(np.zeros(2, np.int64)), frozen(np.zeros(2)), frozen_integers(np.zeros(5, np.int64)),
+    frozen_integers(np.zeros(2, np.int64)), frozen(np.zeros(2)), frozen_integers(np.zeros(6, np.int64)),
 )  # fmt: skip

@@ -1198,5 +1198,3 @@ def path_length(path):
         c = path.coefficients[:, :, :3]
         speed = np.linalg.norm(c[:, 1] + e * (2 * c[:, 2] + 3 * e * c[:, 3]), axis=1)
         total += 0.5 * weight * (speed * path.length).sum()
-
-

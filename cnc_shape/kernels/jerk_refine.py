@@ -22,7 +22,7 @@ from cnc_shape.kernels.jerk_spline import LEAST_NODES, limit_rows, spline, splin
 STEP = 0.2  # -, of the time in which the acceleration rises: longest time between nodes
 LEAST_STEPS = 1.0 / 500.0  # -, of the time of a window
 LONG_CRUISE = 2.0  # -, of the time in which the acceleration rises: windows end in such a phase
-MOST_PIECES = 1500  # of a window
+MOST_PIECES = 10_000  # of a window
 NEAR_REST = 0.25  # -, of that time: what is nearer to a rest is left as it is
 STILL = 1e-6  # mm/s or rad/s
 SHORTEST_CELL = 1e-7  # mm or rad, between nodes
@@ -34,7 +34,9 @@ WIDE = 1.002  # -, of acceleration at the ends of a window, where the law is giv
 NEAR_ENDS = 8  # segments over which the room becomes less
 MOST_TRIES = 8
 LEAST_LEFT = 0.8  # -, of the room, after a try
-SHORTEST_STEP = 1e-3  # s, mean time in the cells of a window that is worth it
+FREE = 100_000  # nodes of a program that are worked on wherever they are; with every try they count once more
+REFINED = 5  # column of what is counted
+SHORTEST_STEP = 1e-2  # s, mean time in the cells of a window that is worth it later on
 SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: with less the jerk limit is hardly felt
 WORTH = 1e-6  # -, of its time by which a window must get shorter
 
@@ -137,7 +139,7 @@ def refined_window(
     time = 0.0
     for m in range(begin, end + 1):
         time += (finish if m == end else pieces[m, 1]) - (start if m == begin else 0.0)
-    if time < SHORTEST_STEP * (cell[end] - cell[begin]):
+    if counts[REFINED] > FREE and time < SHORTEST_STEP * (cell[end] - cell[begin]):
         return none, no_cell
     step = max(STEP * rise, LEAST_STEPS * time)
     most = int(time / step) + 2 * (end - begin) + 8
@@ -189,6 +191,7 @@ def refined_window(
     curved = np.zeros(straight_a.size)
     near = 1.0
     for _ in range(MOST_TRIES):
+        counts[REFINED] += n
         reached = interior(
             c, border, value, row, cap, room, near, share, slack, price, more_slack, more_price
         )
@@ -218,7 +221,7 @@ def refined_window(
 @kernel
 def refined(
     pieces, cell, rows, length, feed_rate, alone, limit_v2, straight_a, velocity, acceleration, jerk,
-    tolerances,
+    tolerances, counts,
 ):  # fmt: skip
     """Pieces (m,6) of a law and their cells, where it could be made faster; its ends stay what they are."""
     rise = rise_time(acceleration, jerk)
@@ -246,7 +249,7 @@ def refined(
         if curved and end > begin:
             new, new_cell = refined_window(
                 pieces, cell, begin, start, end, finish, rise, rows, length, feed_rate, alone, limit_v2,
-                straight_a, velocity, acceleration, jerk, tolerances,
+                straight_a, velocity, acceleration, jerk, tolerances, counts,
             )  # fmt: skip
         needed = filled + new_cell.size + (end - begin) + 4
         if needed > out_cell.size:
@@ -293,31 +296,56 @@ def put_part(pieces, cell, m, low, high, out, out_cell, filled):
 
 @kernel
 def close_to_fastest(
-    pieces, cell, until, rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration,
-    jerk, at, tolerances,
+    pieces, cell, spans, rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration,
+    jerk, tolerances, counts,
 ):  # fmt: skip
-    """The pieces of the cells before `until` of a law, faster where they can be; cells count from `at`.
+    """The pieces of a law, faster where they can be, and their cells.
 
-    Where the acceleration along the path is limited (`along`), the law stays what it is.
+    Parameters
+    ----------
+    spans (n,4)
+        First cell and end, first piece and end of each part of the law that is to be left by itself.
+    along
+        Where the acceleration along the path is limited, (k,), the law stays what it is.
+    counts
+        `counts[REFINED]`: nodes worked on so far.
     """
-    count = 0
-    while count < cell.size and cell[count] < until:
-        count += 1
-    law = pieces[:count].copy()
-    law_cell = cell[:count].copy()
-    if along.size > 0 or count == 0:
-        return law, law_cell
+    if along.size > 0:
+        return pieces.copy(), cell.copy()
     d = acceleration.size
-    size = length[at : at + until].copy()
-    first = np.empty((until, 2, d))
-    bend = np.empty((until, 2, d))
-    third = np.empty((until, d))
-    derivatives(rows[at : at + until], size, first, bend, third)
-    straight_a = np.empty(until)
-    straight_b = np.empty(until)
-    limits = limit_v2[at : at + until]
-    straight_jerk(limits, straight[at : at + until], first, bend, third, jerk, straight_a, straight_b)
-    return refined(
-        law, law_cell, rows[at : at + until], size, feed_rate[at : at + until], alone[at : at + until], limits,
-        straight_a, velocity, acceleration, jerk, tolerances,
-    )  # fmt: skip
+    out = np.empty((2 * cell.size + 64, 6))
+    out_cell = np.empty(2 * cell.size + 64, np.int64)
+    filled = 0
+    here = 0
+    for n in range(spans.shape[0] + 1):
+        until = spans[n, 2] if n < spans.shape[0] else cell.size
+        if filled + until - here > out_cell.size:
+            out, out_cell = more_room(out, out_cell, until - here)
+        for m in range(here, until):
+            filled = put_part(pieces, cell, m, 0.0, pieces[m, 1], out, out_cell, filled)
+        if n == spans.shape[0]:
+            break
+        begin = spans[n, 0]
+        end = spans[n, 1]
+        here = spans[n, 3]
+        size = length[begin:end].copy()
+        first = np.empty((end - begin, 2, d))
+        bend = np.empty((end - begin, 2, d))
+        third = np.empty((end - begin, d))
+        derivatives(rows[begin:end], size, first, bend, third)
+        straight_a = np.empty(end - begin)
+        straight_b = np.empty(end - begin)
+        limits = limit_v2[begin:end]
+        straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
+        law, law_cell = refined(
+            pieces[until:here].copy(), cell[until:here] - begin, rows[begin:end], size, feed_rate[begin:end],
+            alone[begin:end], limits, straight_a, velocity, acceleration, jerk, tolerances, counts,
+        )  # fmt: skip
+        if filled + law_cell.size > out_cell.size:
+            out, out_cell = more_room(out, out_cell, law_cell.size)
+        for m in range(law_cell.size):
+            for column in range(6):
+                out[filled + m, column] = law[m, column]
+            out_cell[filled + m] = begin + law_cell[m]
+        filled += law_cell.size
+    return out[:filled].copy(), out_cell[:filled].copy()

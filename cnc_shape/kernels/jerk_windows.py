@@ -132,15 +132,22 @@ def calm_cells(rows, length, limit_v2, acceleration, jerk, pieces, cell, begin, 
 
 
 @kernel
-def released(pieces, cell, at, out, out_cell, filled):
-    """Append pieces; returns the arrays and how many they hold."""
-    if filled + cell.size > out_cell.size:
-        out, out_cell = more_room(out, out_cell, cell.size)
-    for n in range(cell.size):
+def released(pieces, cell, until, at, out, out_cell, filled, spans, count):
+    """Append the pieces of the cells before `until` as one span; returns the arrays and their numbers."""
+    size = 0
+    while size < cell.size and cell[size] < until:
+        size += 1
+    if filled + size > out_cell.size:
+        out, out_cell = more_room(out, out_cell, size)
+    for n in range(size):
         for column in range(6):
             out[filled + n, column] = pieces[n, column]
         out_cell[filled + n] = at + cell[n]
-    return out, out_cell, filled + cell.size
+    spans[count, 0] = at
+    spans[count, 1] = at + until
+    spans[count, 2] = filled
+    spans[count, 3] = filled + size
+    return out, out_cell, filled + size, count + 1
 
 
 @kernel
@@ -171,8 +178,9 @@ def windows_law(
         Law of the window that was held back; its cells are the first of the path.
     marks (2,), speeds (2,)
         Its joint and its end; speeds at its start and at the joint. Changed. A joint of 0: nothing is held.
-    counts (5,)
-        What has been done so far: cells planned, joints made, windows planned as one, rests, cells slowed.
+    counts (6,)
+        What has been done so far: cells planned, joints made, windows planned as one, rests, cells slowed, nodes
+        refined.
 
     Returns
     -------
@@ -186,6 +194,8 @@ def windows_law(
     count = length.size
     out = np.empty((4 * count + 64, 6))
     out_cell = np.empty(4 * count + 64, np.int64)
+    spans = np.empty((count + 1, 4), np.int64)  # cells and pieces, first and end, between two joints
+    made = 0
     filled = 0
     at = 0
     most = count
@@ -204,21 +214,21 @@ def windows_law(
             end = begin + most
             rests = True
         entry = speeds[1] if marks[0] > 0 else 0.0
+        known = 0  # joint from which the law has been sought in vain
         pieces, cell, cap, work, found = section_law(
             rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin,
             end, entry, 0, 0, 0.0, tolerances, most_rounds,
         )  # fmt: skip
         counts[PLANNED] += work
         if found == 0 and marks[0] > 0:
-            held, held_cell = close_to_fastest(
-                held, held_cell, marks[0], rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
-                acceleration, jerk, at, tolerances,
-            )  # fmt: skip
-            out, out_cell, filled = released(held, held_cell, at, out, out_cell, filled)
+            out, out_cell, filled, made = released(
+                held, held_cell, marks[0], at, out, out_cell, filled, spans, made
+            )
             at = begin
         elif found > 0 and marks[0] > 0:
             counts[MERGED] += 1
             entry = speeds[0]
+            known = marks[0]
             pieces, cell, cap, work, found = section_law(
                 rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
                 end, entry, 0, 0, 0.0, tolerances, most_rounds,
@@ -226,11 +236,9 @@ def windows_law(
             counts[PLANNED] += work
             if found > 0:
                 counts[RESTS] += 1
-                held, held_cell = close_to_fastest(
-                    held, held_cell, marks[1], rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
-                    acceleration, jerk, at, tolerances,
-                )  # fmt: skip
-                out, out_cell, filled = released(held, held_cell, at, out, out_cell, filled)
+                out, out_cell, filled, made = released(
+                    held, held_cell, marks[1], at, out, out_cell, filled, spans, made
+                )
                 at += marks[1]
                 marks[0] = 0
                 continue
@@ -250,17 +258,15 @@ def windows_law(
         most = count
         marks[0] = 0
         if rests:
-            pieces, cell = close_to_fastest(
-                pieces, cell, end - at, rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
-                acceleration, jerk, at, tolerances,
-            )  # fmt: skip
-            out, out_cell, filled = released(pieces, cell, at, out, out_cell, filled)
+            out, out_cell, filled, made = released(
+                pieces, cell, end - at, at, out, out_cell, filled, spans, made
+            )
             at = end
             continue
         joint, speed = last_joint(pieces, cell, cap, end - at)
         wide = 1.0
         for _ in range(CALM_TRIES):
-            if joint > 0:
+            if joint > known:
                 break
             low, high, calm = calm_cells(
                 rows, length, limit_v2, acceleration, jerk, pieces, cell, at, end, wide
@@ -276,16 +282,14 @@ def windows_law(
             counts[PLANNED] += work
             if found == 0:
                 joint, speed = last_joint(calmed, calmed_cell, calmed_cap, end - at)
-                if joint > 0:
+                if joint > known:
                     pieces = calmed
                     cell = calmed_cell
-        if joint == 0:
+        if joint <= known:
             counts[RESTS] += 1
-            pieces, cell = close_to_fastest(
-                pieces, cell, end - at, rows, length, feed_rate, alone, limit_v2, straight, along, velocity,
-                acceleration, jerk, at, tolerances,
-            )  # fmt: skip
-            out, out_cell, filled = released(pieces, cell, at, out, out_cell, filled)
+            out, out_cell, filled, made = released(
+                pieces, cell, end - at, at, out, out_cell, filled, spans, made
+            )
             at = end
             continue
         held = pieces
@@ -294,4 +298,8 @@ def windows_law(
         marks[1] = end - at
         speeds[0] = entry
         speeds[1] = speed
-    return out[:filled], out_cell[:filled], held, held_cell, at
+    pieces, cell = close_to_fastest(
+        out[:filled], out_cell[:filled], spans[:made], rows, length, feed_rate, alone, limit_v2, straight,
+        along, velocity, acceleration, jerk, tolerances, counts,
+    )  # fmt: skip
+    return pieces, cell, held, held_cell, at
