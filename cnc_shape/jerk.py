@@ -23,6 +23,7 @@ from cnc_shape.feedrate import (
     rotary_only,
 )
 from cnc_shape.kernels.jerk_pieces import timed
+from cnc_shape.kernels.jerk_refine import close_to_fastest
 from cnc_shape.kernels.jerk_windows import windows_law
 from cnc_shape.kernels.path_limits import straight_along
 from cnc_shape.kernels.speed_limits import speed_limits
@@ -90,10 +91,14 @@ def jerk_planning(
         along = accelerations_along(whole, path_limits)
         if along.size:
             straight = straight_along(asked, straight, along)
-        pieces, cell, held, held_cell, final = windows_law(
+        pieces, cell, spans, held, held_cell, final = windows_law(
             asked, whole.length, whole.stop, whole.dwell, feed_rate, alone, limit_v2, straight, along,
             velocity, acceleration, jerk, TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD,
             before.held.copy(), before.held_cell.copy(), marks, speeds, counts,
+        )  # fmt: skip
+        pieces, cell = close_to_fastest(
+            pieces, cell, spans, asked, whole.length, feed_rate, alone, limit_v2, straight, along, velocity,
+            acceleration, jerk, TOLERANCES, counts,
         )  # fmt: skip
         timed(pieces, clock)
         profile = _profile(whole.cut(slice(0, final)), pieces, cell)

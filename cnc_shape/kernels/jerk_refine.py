@@ -130,7 +130,7 @@ def peaks(pieces, cell, limit_v2, worst):
 @kernel
 def refined_window(
     pieces, cell, begin, start, end, finish, rise, rows, length, feed_rate, alone, limit_v2, straight_a,
-    velocity, acceleration, jerk, tolerances,
+    velocity, acceleration, jerk, tolerances, counts,
 ):  # fmt: skip
     """Pieces of a faster law between two points of a law; no pieces if there is none."""
     d = acceleration.size
@@ -190,6 +190,7 @@ def refined_window(
     worst = np.empty((straight_a.size, 7))
     curved = np.zeros(straight_a.size)
     near = 1.0
+    first = np.int64(0)
     for _ in range(MOST_TRIES):
         counts[REFINED] += n
         reached = interior(
@@ -209,7 +210,7 @@ def refined_window(
         if not shorter < time * (1.0 - WORTH):
             return none, no_cell
         certificate(
-            new, new_cell, 0, count, curved, rows, 0, feed_rate, alone, velocity, acceleration, jerk,
+            new, new_cell, first, count, curved, rows, first, feed_rate, alone, velocity, acceleration, jerk,
             tolerances, worst,
         )  # fmt: skip
         peaks(new, new_cell, limit_v2, worst)
@@ -229,7 +230,7 @@ def refined(
         return pieces, cell
     out = np.empty((2 * cell.size + 64, 6))
     out_cell = np.empty(2 * cell.size + 64, np.int64)
-    filled = 0
+    filled = np.int64(0)
     begin, size = between_ends(pieces, NEAR_REST * rise)
     first = begin
     for m in range(begin):
@@ -315,7 +316,7 @@ def close_to_fastest(
     d = acceleration.size
     out = np.empty((2 * cell.size + 64, 6))
     out_cell = np.empty(2 * cell.size + 64, np.int64)
-    filled = 0
+    filled = np.int64(0)
     here = 0
     for n in range(spans.shape[0] + 1):
         until = spans[n, 2] if n < spans.shape[0] else cell.size

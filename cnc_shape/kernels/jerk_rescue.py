@@ -38,13 +38,14 @@ def straight_phases(distance, v, a, b, law, cell):
     place = b * ramp**3 / 6.0
     later = half - (top * ramp - place)
     cruise = max(distance - 2.0 * half, 0.0)
-    put(law, cell, 0, ramp, 0.0, 0.0, 0.0, b, 0)
-    put(law, cell, 1, hold, place, low, high, 0.0, 0)
-    put(law, cell, 2, ramp, later, top - low, high, -b, 0)
-    put(law, cell, 3, cruise / top, half, top, 0.0, 0.0, 0)
-    put(law, cell, 4, ramp, distance - half, top, 0.0, -b, 0)
-    put(law, cell, 5, hold, distance - later, top - low, -high, 0.0, 0)
-    put(law, cell, 6, ramp, distance - place, low, -high, b, 0)
+    first = np.int64(0)
+    put(law, cell, first, ramp, 0.0, 0.0, 0.0, b, first)
+    put(law, cell, first + 1, hold, place, low, high, 0.0, first)
+    put(law, cell, first + 2, ramp, later, top - low, high, -b, first)
+    put(law, cell, first + 3, cruise / top, half, top, 0.0, 0.0, first)
+    put(law, cell, first + 4, ramp, distance - half, top, 0.0, -b, first)
+    put(law, cell, first + 5, hold, distance - later, top - low, -high, 0.0, first)
+    put(law, cell, first + 6, ramp, distance - place, low, -high, b, first)
     return PHASES
 
 
@@ -75,10 +76,11 @@ def slow_law(
     w = straight_phases(nodes[count], v, a, b, law, law_cell)
     pieces = np.empty((PHASES + 2 * count + 1, 6))
     cell = np.empty(PHASES + 2 * count + 1, np.int64)
-    m = cut(law, law_cell, w, nodes, 0, pieces, cell)
+    none = np.int64(0)
+    m = cut(law, law_cell, w, nodes, none, pieces, cell)
     worst = np.zeros((count, 7))
     looked_at(
-        pieces, cell, 0, m, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
+        pieces, cell, none, m, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
         jerk, tolerances, worst,
     )  # fmt: skip
     share = 1.0

@@ -17,7 +17,6 @@ import numpy as np
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_law import NO_ACCELERATION, section_law
 from cnc_shape.kernels.jerk_pieces import index_pieces, more_room
-from cnc_shape.kernels.jerk_refine import close_to_fastest
 from cnc_shape.kernels.jerk_rescue import slow_law
 
 SAME_CAP = 1e-9  # -, of a speed that is the node's own cap
@@ -179,13 +178,14 @@ def windows_law(
     marks (2,), speeds (2,)
         Its joint and its end; speeds at its start and at the joint. Changed. A joint of 0: nothing is held.
     counts (6,)
-        What has been done so far: cells planned, joints made, windows planned as one, rests, cells slowed, nodes
-        refined.
+        What has been done so far: cells planned, joints made, windows planned as one, rests, cells slowed.
 
     Returns
     -------
     pieces (m,6), cell (m,)
         0, duration, place in the cell, v, a, b: what is final.
+    spans (n,4)
+        Cells and pieces, first and end, of its parts between two joints.
     held, held_cell
         What is held back now.
     done
@@ -194,10 +194,11 @@ def windows_law(
     count = length.size
     out = np.empty((4 * count + 64, 6))
     out_cell = np.empty(4 * count + 64, np.int64)
+    nothing = np.int64(0)  # a bare 0 has a type of its own, and kernels called with it a second version
     spans = np.empty((count + 1, 4), np.int64)  # cells and pieces, first and end, between two joints
-    made = 0
-    filled = 0
-    at = 0
+    made = nothing
+    filled = nothing
+    at = nothing
     most = count
     while at < count:
         begin = at + marks[0]
@@ -217,7 +218,7 @@ def windows_law(
         known = 0  # joint from which the law has been sought in vain
         pieces, cell, cap, work, found = section_law(
             rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin,
-            end, entry, 0, 0, 0.0, tolerances, most_rounds,
+            end, entry, nothing, nothing, 0.0, tolerances, most_rounds,
         )  # fmt: skip
         counts[PLANNED] += work
         if found == 0 and marks[0] > 0:
@@ -231,7 +232,7 @@ def windows_law(
             known = marks[0]
             pieces, cell, cap, work, found = section_law(
                 rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
-                end, entry, 0, 0, 0.0, tolerances, most_rounds,
+                end, entry, nothing, nothing, 0.0, tolerances, most_rounds,
             )  # fmt: skip
             counts[PLANNED] += work
             if found > 0:
@@ -298,8 +299,4 @@ def windows_law(
         marks[1] = end - at
         speeds[0] = entry
         speeds[1] = speed
-    pieces, cell = close_to_fastest(
-        out[:filled], out_cell[:filled], spans[:made], rows, length, feed_rate, alone, limit_v2, straight,
-        along, velocity, acceleration, jerk, tolerances, counts,
-    )  # fmt: skip
-    return pieces, cell, held, held_cell, at
+    return out[:filled], out_cell[:filled], spans[:made], held, held_cell, at
