@@ -98,7 +98,7 @@ def jerk_planning(
         )  # fmt: skip
         pieces, cell = close_to_fastest(
             pieces, cell, spans, asked, whole.length, feed_rate, alone, limit_v2, straight, along, velocity,
-            acceleration, jerk, TOLERANCES, counts,
+            acceleration, jerk, TOLERANCES, counts, before.passed,
         )  # fmt: skip
         timed(pieces, clock)
         profile = _profile(whole.cut(slice(0, final)), pieces, cell)

@@ -34,9 +34,9 @@ WIDE = 1.002  # -, of acceleration at the ends of a window, where the law is giv
 NEAR_ENDS = 8  # segments over which the room becomes less
 MOST_TRIES = 8
 LEAST_LEFT = 0.8  # -, of the room, after a try
-FREE = 100_000  # nodes of a program that are worked on wherever they are; with every try they count once more
+FREE = 100_000  # nodes that are worked on at once; with every try they count once more
+SHARE = 0.1  # -, of the cells passed by: how many more later on
 REFINED = 5  # column of what is counted
-SHORTEST_STEP = 1e-2  # s, mean time in the cells of a window that is worth it later on
 SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: with less the jerk limit is hardly felt
 WORTH = 1e-6  # -, of its time by which a window must get shorter
 
@@ -130,7 +130,7 @@ def peaks(pieces, cell, limit_v2, worst):
 @kernel
 def refined_window(
     pieces, cell, begin, start, end, finish, rise, rows, length, feed_rate, alone, limit_v2, straight_a,
-    velocity, acceleration, jerk, tolerances, counts,
+    velocity, acceleration, jerk, tolerances, counts, allowed,
 ):  # fmt: skip
     """Pieces of a faster law between two points of a law; no pieces if there is none."""
     d = acceleration.size
@@ -139,7 +139,7 @@ def refined_window(
     time = 0.0
     for m in range(begin, end + 1):
         time += (finish if m == end else pieces[m, 1]) - (start if m == begin else 0.0)
-    if counts[REFINED] > FREE and time < SHORTEST_STEP * (cell[end] - cell[begin]):
+    if counts[REFINED] > allowed:
         return none, no_cell
     step = max(STEP * rise, LEAST_STEPS * time)
     most = int(time / step) + 2 * (end - begin) + 8
@@ -222,7 +222,7 @@ def refined_window(
 @kernel
 def refined(
     pieces, cell, rows, length, feed_rate, alone, limit_v2, straight_a, velocity, acceleration, jerk,
-    tolerances, counts,
+    tolerances, counts, allowed,
 ):  # fmt: skip
     """Pieces (m,6) of a law and their cells, where it could be made faster; its ends stay what they are."""
     rise = rise_time(acceleration, jerk)
@@ -250,7 +250,7 @@ def refined(
         if curved and end > begin:
             new, new_cell = refined_window(
                 pieces, cell, begin, start, end, finish, rise, rows, length, feed_rate, alone, limit_v2,
-                straight_a, velocity, acceleration, jerk, tolerances, counts,
+                straight_a, velocity, acceleration, jerk, tolerances, counts, allowed,
             )  # fmt: skip
         needed = filled + new_cell.size + (end - begin) + 4
         if needed > out_cell.size:
@@ -298,7 +298,7 @@ def put_part(pieces, cell, m, low, high, out, out_cell, filled):
 @kernel
 def close_to_fastest(
     pieces, cell, spans, rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration,
-    jerk, tolerances, counts,
+    jerk, tolerances, counts, passed,
 ):  # fmt: skip
     """The pieces of a law, faster where they can be, and their cells.
 
@@ -310,10 +310,13 @@ def close_to_fastest(
         Where the acceleration along the path is limited, (k,), the law stays what it is.
     counts
         `counts[REFINED]`: nodes worked on so far.
+    passed
+        Cells of the program before the first one.
     """
     if along.size > 0:
         return pieces.copy(), cell.copy()
     d = acceleration.size
+    bound = (1.0 - tolerances[2]) * jerk
     out = np.empty((2 * cell.size + 64, 6))
     out_cell = np.empty(2 * cell.size + 64, np.int64)
     filled = np.int64(0)
@@ -338,9 +341,10 @@ def close_to_fastest(
         straight_b = np.empty(end - begin)
         limits = limit_v2[begin:end]
         straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
+        allowed = FREE + SHARE * (passed + end)
         law, law_cell = refined(
             pieces[until:here].copy(), cell[until:here] - begin, rows[begin:end], size, feed_rate[begin:end],
-            alone[begin:end], limits, straight_a, velocity, acceleration, jerk, tolerances, counts,
+            alone[begin:end], limits, straight_a, velocity, acceleration, bound, tolerances, counts, allowed,
         )  # fmt: skip
         if filled + law_cell.size > out_cell.size:
             out, out_cell = more_room(out, out_cell, law_cell.size)
