@@ -34,6 +34,8 @@ RISE_TIME = 1e-6  # s, in which an axis without jerk limit reaches its accelerat
 TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
 MOST_ROUNDS = 100  # of lowering the limits of cells
 WINDOW, LOOK_AHEAD = 4096, 4.0  # cells and stopping distances that are planned at once, at least
+REFINED_AT_ONCE = 100_000.0  # nodes whose law is brought close to the fastest, counted again with every try
+REFINED_LATER = 0.1  # -, of the cells that a program has passed: how many more
 MOST_PARTS = 64  # that wait without being joined
 PATIENCE = 1024  # cells that gather before a new attempt
 
@@ -99,6 +101,7 @@ def jerk_planning(
         pieces, cell = close_to_fastest(
             pieces, cell, spans, asked, whole.length, feed_rate, alone, limit_v2, straight, along, velocity,
             acceleration, jerk, TOLERANCES, counts, before.passed,
+            REFINED_AT_ONCE, REFINED_LATER,
         )  # fmt: skip
         timed(pieces, clock)
         profile = _profile(whole.cut(slice(0, final)), pieces, cell)

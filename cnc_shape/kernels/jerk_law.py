@@ -156,8 +156,6 @@ def section_law(
     size, first, bend, third, most, straight_a, straight_b = prepared(
         rows, length, limit_v2, straight, along, acceleration, jerk, begin, end
     )
-    bound = (1.0 - tolerances[2]) * jerk  # on curves, where it is kept by what the tolerance leaves
-    most[1] *= 1.0 - tolerances[2]
     limits = limit_v2[begin:end]
     ease = np.ones((count, 5))
     lower = np.ones((count, 5))
@@ -243,7 +241,7 @@ def section_law(
             high = windows[n, 1]
             looked_at(
                 pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
-                alone, along, velocity, acceleration, bound, tolerances, worst,
+                alone, along, velocity, acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
     return pieces, cell, cap, work, found

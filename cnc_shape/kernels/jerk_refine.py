@@ -34,8 +34,6 @@ WIDE = 1.002  # -, of acceleration at the ends of a window, where the law is giv
 NEAR_ENDS = 8  # segments over which the room becomes less
 MOST_TRIES = 8
 LEAST_LEFT = 0.8  # -, of the room, after a try
-FREE = 100_000  # nodes that are worked on at once; with every try they count once more
-SHARE = 0.1  # -, of the cells passed by: how many more later on
 REFINED = 5  # column of what is counted
 SHORTEST_RISE = 1e-3  # s, in which the acceleration rises: with less the jerk limit is hardly felt
 WORTH = 1e-6  # -, of its time by which a window must get shorter
@@ -226,7 +224,7 @@ def refined(
 ):  # fmt: skip
     """Pieces (m,6) of a law and their cells, where it could be made faster; its ends stay what they are."""
     rise = rise_time(acceleration, jerk)
-    if rise < SHORTEST_RISE:
+    if rise < SHORTEST_RISE or (straight_a > 0.0).all():
         return pieces, cell
     out = np.empty((2 * cell.size + 64, 6))
     out_cell = np.empty(2 * cell.size + 64, np.int64)
@@ -298,7 +296,7 @@ def put_part(pieces, cell, m, low, high, out, out_cell, filled):
 @kernel
 def close_to_fastest(
     pieces, cell, spans, rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration,
-    jerk, tolerances, counts, passed,
+    jerk, tolerances, counts, passed, free, share,
 ):  # fmt: skip
     """The pieces of a law, faster where they can be, and their cells.
 
@@ -312,11 +310,12 @@ def close_to_fastest(
         `counts[REFINED]`: nodes worked on so far.
     passed
         Cells of the program before the first one.
+    free, share
+        Nodes that a program has worked on at once, and for each of its cells passed by; less than 0: none.
     """
-    if along.size > 0:
+    if along.size > 0 or free < 0.0:
         return pieces.copy(), cell.copy()
     d = acceleration.size
-    bound = (1.0 - tolerances[2]) * jerk
     out = np.empty((2 * cell.size + 64, 6))
     out_cell = np.empty(2 * cell.size + 64, np.int64)
     filled = np.int64(0)
@@ -341,10 +340,10 @@ def close_to_fastest(
         straight_b = np.empty(end - begin)
         limits = limit_v2[begin:end]
         straight_jerk(limits, straight[begin:end], first, bend, third, jerk, straight_a, straight_b)
-        allowed = FREE + SHARE * (passed + end)
+        allowed = free + share * (passed + end)
         law, law_cell = refined(
             pieces[until:here].copy(), cell[until:here] - begin, rows[begin:end], size, feed_rate[begin:end],
-            alone[begin:end], limits, straight_a, velocity, acceleration, bound, tolerances, counts, allowed,
+            alone[begin:end], limits, straight_a, velocity, acceleration, jerk, tolerances, counts, allowed,
         )  # fmt: skip
         if filled + law_cell.size > out_cell.size:
             out, out_cell = more_room(out, out_cell, law_cell.size)

@@ -254,7 +254,7 @@ def spline_phases(c, place, border, centre, at, at_cell, pieces, cell):
                 own = at_cell[s]
                 here = at[s]
                 left = half - left
-                filled = put_phase(v, a, b, t - begin, here, own, pieces, cell, filled)
+                filled = put_phase(v, a, b, max(t - begin, 0.0), here, own, pieces, cell, filled)
                 here += left
                 left = np.inf
             else:
