@@ -69,7 +69,8 @@ def jerk_planning(
     """Return the resumable step from Path to Profile, as `planning.planning` does.
 
     Velocity, acceleration and feed are kept to 1e-6, jerk to 1e-3. It is not the fastest such motion: on
-    straight lines it is, on curves it takes some percent longer.
+    straight lines it is, on curves it takes some percent longer; more where the acceleration along the path
+    is limited, because then `close_to_fastest` leaves the law as the scans make it.
     """
     velocity = frozen([limit.velocity for limit in limits])
     acceleration = frozen([limit.acceleration for limit in limits])

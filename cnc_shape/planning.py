@@ -6,7 +6,7 @@ Without a jerk limit it is the fastest there is (`feedrate.py`); with one, `jerk
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 from cnc_shape.arrays import FloatArray
 from cnc_shape.feedrate import Profile, ScanState, scanning
@@ -23,7 +23,7 @@ def planning(
 ) -> PlanningStep:
     """Return the resumable step from Path to Profile: ``step(state, chunk, last) -> (state, profile)``.
 
-    The profiles do not depend on how the path was cut into chunks.
+    The profiles do not depend on how the path was cut into chunks. A step takes the states that it has made.
 
     Parameters
     ----------
@@ -34,23 +34,8 @@ def planning(
     path_limits
         Of the motion along the path.
     """
-    if jerk_limited(limits):
-        with_jerk = jerk_planning(limits, gentleness, path_limits)
-
-        def plan_with_jerk(
-            state: PlanningState | None, path: Path, last: bool
-        ) -> tuple[PlanningState | None, Profile]:
-            return with_jerk(state if isinstance(state, JerkState) else None, path, last)
-
-        return plan_with_jerk
-    scan = scanning(limits, gentleness, path_limits)
-
-    def plan_without(
-        state: PlanningState | None, path: Path, last: bool
-    ) -> tuple[PlanningState | None, Profile]:
-        return scan(state if isinstance(state, ScanState) else None, path, last)
-
-    return plan_without
+    make = jerk_planning if jerk_limited(limits) else scanning
+    return cast("PlanningStep", make(limits, gentleness, path_limits))
 
 
 def plan(path: Path, limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS) -> Profile:
@@ -62,7 +47,7 @@ def plan(path: Path, limits: Sequence[Limits], path_limits: PathLimits = NO_PATH
     Raises
     ------
     InfeasibleError
-        A move of an axis without velocity, acceleration or jerk, or without feed; names the line.
+        An axis moves whose velocity, acceleration or jerk limit is 0, or a move has no feed; names the line.
     """
     _, profile = planning(limits, None, path_limits)(None, path, True)
     return profile

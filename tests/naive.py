@@ -762,15 +762,16 @@ def path_excesses(profile, path_limits, points):
             continue
         for t in profile.time[m] + profile.duration[m] * np.linspace(0.0, 1.0, points):
             e = t - profile.time[m]
-            s = profile.u[m] + profile.velocity[m] * e + 0.5 * profile.acceleration[m] * e**2
-            v = profile.velocity[m] + profile.acceleration[m] * e
+            b = profile.jerk[m]
+            s = profile.u[m] + profile.velocity[m] * e + 0.5 * profile.acceleration[m] * e**2 + b * e**3 / 6
+            v = profile.velocity[m] + profile.acceleration[m] * e + b * e**2 / 2
             c = profile.path.coefficients[k]
             first, second = c[1] + 2 * c[2] * s + 3 * c[3] * s**2, 2 * c[2] + 6 * c[3] * s
             tangent = first[:3] / np.linalg.norm(first[:3])
-            push = abs(tangent @ (first * profile.acceleration[m] + second * v**2)[:3])
-            allowed = chord_speed(
-                curvatures(c, np.array([s]))[0], path_limits.interpolation_period, path_limits.chord_error
-            )
+            push = abs(tangent @ (first * (profile.acceleration[m] + b * e) + second * v**2)[:3])
+            allowed = np.inf
+            if path_limits.chord is not None:
+                allowed = chord_speed(curvatures(c, np.array([s]))[0], *path_limits.chord)
             speed = np.linalg.norm(first[:3]) * v
             worst = np.maximum(worst, [push / path_limits.acceleration, speed / allowed])
     return worst
@@ -1198,3 +1199,4 @@ def path_length(path):
         c = path.coefficients[:, :, :3]
         speed = np.linalg.norm(c[:, 1] + e * (2 * c[:, 2] + 3 * e * c[:, 3]), axis=1)
         total += 0.5 * weight * (speed * path.length).sum()
+    return total

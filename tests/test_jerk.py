@@ -15,7 +15,7 @@ from test_feedrate import SQUARE
 from cnc_shape.arrays import frozen
 from cnc_shape.certificate import worst_violation
 from cnc_shape.errors import InfeasibleError
-from cnc_shape.feedrate import Profile
+from cnc_shape.feedrate import Profile, scan_path
 from cnc_shape.kernels.jerk_rounding import round_off
 from cnc_shape.limits import Limits
 from cnc_shape.planning import plan
@@ -85,7 +85,7 @@ def test_with_a_high_jerk_limit_it_is_the_law_without(tolerance):
 
 def test_without_jerk_limits_it_is_the_law_without_bit_for_bit():
     path = smooth(wander(np.random.default_rng(7), 200), Smoothing(0.01))
-    one, other = plan(path, MILL), plan(path, MILL)
+    one, other = plan(path, MILL), scan_path(path, MILL)
     for name in ("time", "duration", "u", "velocity", "acceleration", "jerk", "cell"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
@@ -99,14 +99,6 @@ def test_a_straight_of_100_000_blocks_is_one_move():
     assert_allclose(profile.end_time, naive.rest_to_rest(1000.0, 180.0, 2000.0, 5e4), rtol=1e-8)
 
 
-def test_a_zigzag_within_the_tolerance_is_a_straight_but_for_its_last_blocks():
-    """Those are no chord of the merge; following them takes 0.03 s."""
-    n = 5000
-    points = np.column_stack([0.02 * np.arange(n + 1), 0.004 * (np.arange(n + 1) % 2)])
-    expected = naive.rest_to_rest(100.0, 100.0, 2000.0, 5e4)
-    assert_allclose(planned(lines(points)).end_time, expected, rtol=0, atol=0.04)
-
-
 @pytest.mark.parametrize(
     "name", ["lcnc_boat_xyzbc.ngc", "lcnc_lathe_pawn.ngc", "ugs_no_spaces.gcode", "lcnc_cds.ngc"]
 )
@@ -116,7 +108,8 @@ def test_real_programs_keep_every_limit(shared, name, limits):
     every = [*limits, *[Limits(3.0, 30.0, 750.0)] * 3][: len(whole.axes)]
     profile = planned(whole, every)
     assert_keeps(profile, every)
-    assert 1.0 <= profile.end_time / plan(profile.path, every).end_time <= 1.03
+    fastest = plan(profile.path, [replace(limit, jerk=np.inf) for limit in every]).end_time
+    assert 1.0 - 1e-4 <= profile.end_time / fastest <= 1.06
 
 
 def corners(seed, n=10):

@@ -67,6 +67,7 @@ def test_random_programs_keep_every_limit(seed, path_limits, tolerance, limits):
     path = smooth(wander(np.random.default_rng(seed), 200), Smoothing(tolerance))
     profile = plan(path, limits, path_limits)
     assert_keeps(profile, limits, path_limits, 129)
+    assert (naive.path_excesses(profile, path_limits, 33) <= 1.0 + 2e-6).all()
     assert profile.end_time >= plan(path, limits).end_time * (1 - 0.02)
 
 

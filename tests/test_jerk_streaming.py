@@ -56,7 +56,10 @@ def small_windows(monkeypatch):
 
 @pytest.mark.usefixtures("small_windows")
 @pytest.mark.parametrize("kind", ["wander", "spiral", "slow spiral"])
-def test_chunks_do_not_change_a_bit(kind):
+@pytest.mark.parametrize("at_once", [100_000.0, 400.0])
+def test_chunks_do_not_change_a_bit(kind, at_once, monkeypatch):
+    """Neither where all of a law is brought close to the fastest, nor where that ends on the way."""
+    monkeypatch.setattr("cnc_shape.jerk.REFINED_AT_ONCE", at_once)
     whole = wander(np.random.default_rng(3), 600) if kind == "wander" else lines(spiral(12), 150.0)
     limits = [Limits(200.0, 2000.0, 2e3 if kind == "slow spiral" else 5e4)] * 3
     path = smooth(whole, Smoothing(0.01))

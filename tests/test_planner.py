@@ -150,9 +150,9 @@ def test_a_circle_in_blocks_without_jerk_limit(block, most):
     assert_true_to(path, whole, 0.01)
 
 
-@pytest.mark.parametrize(("block", "most"), [(0.01, 0.7), (0.05, 0.7), (0.3, 0.7), (1.0, 1.4)])
+@pytest.mark.parametrize(("block", "most"), [(0.01, 0.49), (0.05, 0.51), (0.3, 0.54), (1.0, 1.17)])
 def test_a_circle_in_blocks_with_the_jerk_limit_of_the_mill(block, most):
-    """As above. Linear programs find 0.48 s at 0.05 mm, 0.49 at 0.3 mm: the law leaves much there."""
+    """As above. Linear programs find 0.48 s at 0.05 mm, 0.49 at 0.3 mm."""
     path = smooth(lines(a_circle(5.0, block)), Smoothing(0.01))
     profile = plan(path, MILL_J)
     assert profile.end_time <= most
@@ -210,7 +210,10 @@ def tangent_path(mode=PathMode.BLEND, feed=60.0) -> Toolpath:
 
 @pytest.mark.parametrize("limits", [MILL, MILL_J], ids=["no jerk", "jerk"])
 def test_tangent_lines_and_arcs_run_through(limits):
-    """At no time slower than a fifth below what the curvature allows, ends apart: sqrt(a R)."""
+    """At no time slower than a fifth below what the curvature allows, ends apart: sqrt(a R).
+
+    With a jerk limit the curvature has to rise: the floor is a quarter of that.
+    """
     whole = tangent_path()
     path = smooth(whole, Smoothing(0.01))
     profile = plan(path, limits)
@@ -225,9 +228,9 @@ def test_tangent_lines_and_arcs_run_through(limits):
     assert speed.min() >= (floor if limits is MILL else 0.25 * floor)
 
 
-@pytest.mark.parametrize(("limits", "most"), [(MILL, 1e-3), (MILL_J, 0.15)], ids=["no jerk", "jerk"])
+@pytest.mark.parametrize(("limits", "most"), [(MILL, 1e-3), (MILL_J, 0.06)], ids=["no jerk", "jerk"])
 def test_an_exact_path_runs_through_tangent_joints_by_one_micrometre(limits, most):
-    """What G61 costs: nothing without a jerk limit; with one 1.84 s, blended 1.62 s, at rest in each joint 2.16 s."""
+    """What G61 costs: nothing without a jerk limit; with one 1.69 s, blended 1.62 s, at rest in each joint 1.96 s."""
     exact, blend = (tangent_path(mode) for mode in (PathMode.EXACT_PATH, PathMode.BLEND))
     path = smooth(exact, Smoothing(0.01))
     profile = plan(path, limits)
