@@ -56,7 +56,7 @@ def small_windows(monkeypatch):
 
 @pytest.mark.usefixtures("small_windows")
 @pytest.mark.parametrize("kind", ["wander", "spiral", "slow spiral"])
-@pytest.mark.parametrize("at_once", [100_000.0, 400.0])
+@pytest.mark.parametrize("at_once", [30_000.0, 400.0])
 def test_chunks_do_not_change_a_bit(kind, at_once, monkeypatch):
     """Neither where all of a law is brought close to the fastest, nor where that ends on the way."""
     monkeypatch.setattr("cnc_shape.jerk.REFINED_AT_ONCE", at_once)
