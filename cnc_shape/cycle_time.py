@@ -150,7 +150,7 @@ def clocking(limits: Sequence[Limits], path_limits: PathLimits = NO_PATH_LIMITS)
             rest,
             _summed(now.sums, moves, profile),
             profile.end_time if len(profile) else now.cycle_time,
-            now.stops + int(np.count_nonzero(profile.path.stop)),
+            now.stops + _rests(profile),
             _by_line(now.lines, moves),
             excess,
             stretch.moved,
@@ -234,3 +234,10 @@ def _worst(parts: tuple[_Lines, ...]) -> tuple[LineTime, ...]:
         found += [LineTime(int(part.line[k]), float(part.time[k]), float(part.naive_time[k])) for k in order]
     found.sort(key=lambda line: -round(line.lost, DECIMALS))
     return tuple(line for line in found[:WORST_LINES] if round(line.lost, DECIMALS) > 0.0)
+
+
+def _rests(profile: Profile) -> int:
+    """Stops of the path, and nodes between them at which the law rests all the same."""
+    stop = profile.path.stop
+    resting = (profile.velocity == 0.0) & (profile.u == 0.0) & ~stop[profile.cell]
+    return int(np.count_nonzero(stop)) + int(np.count_nonzero(resting))

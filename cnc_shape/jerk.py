@@ -32,7 +32,7 @@ from cnc_shape.smoothing import Path, join_paths
 
 RISE_TIME = 1e-6  # s, in which an axis without jerk limit reaches its acceleration
 TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed, acceleration and jerk
-MOST_ROUNDS = 100  # of lowering the limits of cells
+MOST_ROUNDS = 1000  # of lowering the limits of cells
 WINDOW, LOOK_AHEAD = 4096, 4.0  # cells and stopping distances that are planned at once, at least
 REFINED_AT_ONCE = 30_000.0  # nodes whose law is brought close to the fastest, counted again with every try
 REFINED_LATER = 0.1  # -, of the cells that a program has passed: how many more

@@ -279,3 +279,33 @@ def piece_points(phase, count):
     duration, place, v, a, b = phase
     t = np.linspace(0.0, duration, count)
     return place + t * (v + t * (a / 2 + t * b / 6)), v + t * (a + t * b / 2)
+
+
+def test_a_corner_between_short_straights_is_hardly_slower_than_a_rest_in_it():
+    points = [[0, 0], [0.0055069, 0.0012751], [0.0041093, 0.0013945]]
+    blend, rest = (
+        plan(smooth(lines(points, 1.7, mode), Smoothing(0.00146)), MILL_J).end_time
+        for mode in (PathMode.BLEND, PathMode.EXACT_STOP)
+    )
+    assert blend <= 1.02 * rest
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "limits"), [(1e-4, MILL_J), (1e-3, [Limits(500.0, 2000.0, 2000.0)] * 3)]
+)
+def test_an_arc_of_many_cells_is_run_through(tolerance, limits):
+    whole = toolpath(arc((0, 151.38, 0), (0, 75.69, 0), np.pi, feed_rate=100.0))
+    profile = planned(whole, limits, tolerance)
+    assert_keeps(profile, limits)
+    assert profile.velocity[1:-1].min() > 0.0
+
+
+def test_a_bend_that_takes_all_of_the_acceleration_at_its_end_is_not_crept_up_to():
+    """Axes as unlike as these: an exact stop in every corner takes no less than two thirds of the time."""
+    limits = [Limits(50.0, 5000.0, 6.7e5), Limits(200.0, 2000.0, 1e5), Limits(1990.0, 0.441, 87.0)]
+    for seed in range(40):
+        whole = wander(np.random.default_rng(seed), 20)
+        profile = planned(whole, limits, 0.003)
+        assert_keeps(profile, limits)
+        free = plan(profile.path, [replace(limit, jerk=np.inf) for limit in limits]).end_time
+        assert profile.end_time <= 6.0 * free

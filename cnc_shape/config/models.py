@@ -30,7 +30,7 @@ class LinearLimits(Strict):
 
     velocity_mm_s: Positive
     acceleration_mm_s2: Positive
-    jerk_mm_s3: Annotated[float, Field(gt=0.0, le=1e12)] | None = None
+    jerk_mm_s3: Annotated[float, Field(ge=1e-3, le=1e12)] | None = None
     travel_mm: Interval | None = None
 
 
@@ -39,7 +39,7 @@ class RotaryLimits(Strict):
 
     velocity_deg_s: Positive
     acceleration_deg_s2: Positive
-    jerk_deg_s3: Annotated[float, Field(gt=0.0, le=1e12)] | None = None
+    jerk_deg_s3: Annotated[float, Field(ge=1e-3, le=1e12)] | None = None
     travel_deg: Interval | None = None
 
 

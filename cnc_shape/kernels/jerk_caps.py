@@ -103,7 +103,11 @@ def curved_caps(first, bend, third, h, v, a, next_cap, acceleration, jerk, ease)
     for i in range(third.size):
         if first[1, i] != 0.0:
             sign = 1.0 if first[1, i] > 0.0 else -1.0
-            high = min(high, (ease[1] * acceleration[i] - sign * bend[1, i] * x) / abs(first[1, i]))
+            own = (ease[1] * acceleration[i] - sign * bend[1, i] * x) / abs(first[1, i])
+            if sign * bend[1, i] > 0.0:
+                reach = abs(first[1, i]) + 2.0 * h * sign * bend[1, i]
+                own = max(own, (ease[1] * acceleration[i] - sign * bend[1, i] * v * v) / reach)
+            high = min(high, own)
         bent = 3.0 * abs(bend[1, i]) * exit_v
         if bent > 0.0:
             high = min(high, ease[2] * jerk[i] / bent)

@@ -52,7 +52,7 @@ def cut(law, law_cell, count, nodes, first, pieces, cell):
         begin = 0.0
         while True:
             to_node = nodes[k + 1] - origin
-            inside = k < last and to_node < end - near
+            inside = k < last and (to_node < end - near or to_node <= place + near)
             until = begin
             if not (k < last and to_node <= place + near):
                 until = time_to(v, a, b, whole, to_node - place) if inside else whole

@@ -121,7 +121,7 @@ def scan(
             a = 0.0
         limit = cap[k + 1]
         if v > limit:
-            if straight and h * steep > limit * high:  # room to be faster within the cell
+            if straight and h * steep > limit * min(high, np.sqrt(limit * steep)):  # room to be faster inside
                 v = limit
                 a = 0.0
             elif limit <= entry_v:
