@@ -35,7 +35,7 @@ TOLERANCES = frozen([1e-9, 5e-7, 5e-4])  # -, by which the law may exceed speed,
 MOST_ROUNDS = 1000  # of lowering the limits of cells
 WINDOW, LOOK_AHEAD = 4096, 4.0  # cells and stopping distances that are planned at once, at least
 REFINED_AT_ONCE = 30_000.0  # nodes whose law is brought close to the fastest, counted again with every try
-REFINED_LATER = 0.1  # -, of the cells that a program has passed: how many more
+REFINED_LATER = 0.02  # -, of the cells that a program has passed: how many more
 MOST_PARTS = 64  # that wait without being joined
 PATIENCE = 1024  # cells that gather before a new attempt
 

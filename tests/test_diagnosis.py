@@ -30,7 +30,7 @@ def cnc_shape(*words: str, without: tuple[str, ...] = (), **environment: str):
     )
     return subprocess.run(
         [sys.executable, "-c", code, *words],
-        capture_output=True, text=True, cwd=ROOT, env={**os.environ, **environment}, timeout=300, check=False,
+        capture_output=True, text=True, cwd=ROOT, env={**os.environ, **environment}, timeout=900, check=False,
     )  # fmt: skip
 
 
