@@ -387,7 +387,7 @@ def corner_times(degrees, heading, tolerance, ratio, feed):
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 0.01, 0.1, 1.0])
-@pytest.mark.parametrize(("ratio", "loss"), [(10.0, 0.07), (50.0, 0.03), (1000.0, 0.003)])
+@pytest.mark.parametrize(("ratio", "loss"), [(10.0, 0.04), (50.0, 0.014), (1000.0, 0.001)])
 def test_blending_a_corner_costs_little_against_stopping_in_it(tolerance, ratio, loss):
     """The law leaves the corner without acceleration: where jerk is scarce, a rest can be the faster way."""
     for degrees in (10, 45, 90, 135, 160):
