@@ -125,7 +125,7 @@ def scanning(
             raise InfeasibleError(
                 "a single curved cell between two stops has no time law", line=int(done.line[stuck])
             )
-        profile = _profile(done, pieces, cell)
+        profile = profile_of(done, pieces, cell)
         if last:
             return None, profile
         rest = whole.cut(slice(final, None))
@@ -218,11 +218,12 @@ def check_executable(path: Path, limits: Sequence[tuple[str, FloatArray]]) -> No
                 )
 
 
-def _profile(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
+def profile_of(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
+    """Pieces (m,5) of constant acceleration, or (m,6) of constant jerk, as a profile of `path`."""
     time, duration, u, velocity, acceleration = (frozen(pieces[:, column]) for column in range(5))
-    jerk = frozen(np.zeros(time.size))
+    jerk = frozen(pieces[:, 5] if pieces.shape[1] > 5 else np.zeros(time.size))
     return Profile(path, time, duration, u, velocity, acceleration, jerk, frozen_integers(cell))
 
 
 def _no_pieces(path: Path) -> Profile:
-    return _profile(path, np.empty((0, 5)), np.empty(0, np.int64))
+    return profile_of(path, np.empty((0, 5)), np.empty(0, np.int64))

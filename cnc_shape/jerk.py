@@ -20,6 +20,7 @@ from cnc_shape.feedrate import (
     check_executable,
     chord_feed_rate,
     gentle,
+    profile_of,
     rotary_only,
 )
 from cnc_shape.kernels.jerk_pieces import timed
@@ -85,7 +86,7 @@ def jerk_planning(
         gathered = sum(len(part) for part in parts)
         if gathered == 0 or (not last and gathered < before.patience):
             waiting = None if last else replace(before, parts=parts)
-            return waiting, _profile(path.cut(slice(0, 0)), _NO_PIECES, _NO_CELLS)
+            return waiting, profile_of(path.cut(slice(0, 0)), _NO_PIECES, _NO_CELLS)
         whole = join_paths(parts)
         asked, feed_rate = gentle(whole, chord_feed_rate(whole, path_limits), gentleness, before.passed)
         alone, clock = rotary_only(whole), before.clock.copy()
@@ -95,17 +96,16 @@ def jerk_planning(
         if along.size:
             straight = straight_along(asked, straight, along)
         pieces, cell, spans, held, held_cell, final = windows_law(
-            asked, whole.length, whole.stop, whole.dwell, feed_rate, alone, limit_v2, straight, along,
-            velocity, acceleration, jerk, TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD,
-            before.held.copy(), before.held_cell.copy(), marks, speeds, counts,
+            asked, whole.length, whole.stop, whole.dwell, limit_v2, straight, along, acceleration, jerk,
+            TOLERANCES, MOST_ROUNDS, last, WINDOW, LOOK_AHEAD, before.held.copy(), before.held_cell.copy(),
+            marks, speeds, counts,
         )  # fmt: skip
         pieces, cell = close_to_fastest(
-            pieces, cell, spans, asked, whole.length, feed_rate, alone, limit_v2, straight, along, velocity,
-            acceleration, jerk, TOLERANCES, counts, before.passed,
-            REFINED_AT_ONCE, REFINED_LATER,
+            pieces, cell, spans, asked, whole.length, limit_v2, straight, along, acceleration, jerk,
+            TOLERANCES, counts, before.passed, REFINED_AT_ONCE, REFINED_LATER,
         )  # fmt: skip
         timed(pieces, clock)
-        profile = _profile(whole.cut(slice(0, final)), pieces, cell)
+        profile = profile_of(whole.cut(slice(0, final)), pieces, cell)
         if last:
             return None, profile
         rest = whole.cut(slice(final, None))
@@ -120,11 +120,6 @@ def jerk_planning(
 
 def _jerk(limit: Limits) -> float:
     return min(limit.jerk, limit.acceleration / RISE_TIME)
-
-
-def _profile(path: Path, pieces: FloatArray, cell: IntArray) -> Profile:
-    time, duration, u, velocity, acceleration, jerk = (frozen(pieces[:, column]) for column in range(6))
-    return Profile(path, time, duration, u, velocity, acceleration, jerk, frozen_integers(cell))
 
 
 _NO_PIECES, _NO_CELLS = np.empty((0, 6)), np.empty(0, np.int64)

@@ -123,9 +123,8 @@ def test_the_slow_law_of_a_straight_is_the_closed_form(length):
         path.coefficients, path.length, path.feed_rate, alone, velocity, acceleration
     )
     pieces, _ = slow_law(
-        path.coefficients, path.length, path.feed_rate, alone, limit_v2, straight, frozen([]), velocity,
-        acceleration, jerk, 0, 1, TOLERANCES,
-    )  # fmt: skip
+        path.coefficients, path.length, limit_v2, straight, frozen([]), acceleration, jerk, 0, 1, TOLERANCES
+    )
     assert_allclose(pieces[:, 1].sum(), naive.rest_to_rest(length, 50.0, 2000.0, 5e4), rtol=1e-9)
 
 

@@ -180,11 +180,8 @@ def test_dwells_add_up_and_the_last_one_is_kept():
     assert_allclose(edges.dwell, [0.3, 0.4])
 
 
-@pytest.mark.parametrize("sizes", [[1], [3, 0, 1], [64], [50, 7]])
-def test_chunks_do_not_change_the_polyline(sizes):
-    rng = np.random.default_rng(5)
-    points = np.cumsum(rng.normal([0.02, 0.0, 0.0], 0.002, size=(400, 3)), axis=0)
-    whole = lines(points, np.where(np.arange(399) < 150, 40.0, 90.0))
+def assert_chunks_change_nothing(whole, sizes):
+    """The same edges, to the bit, whole and in chunks."""
     step, state, parts = polyline(MERGING), None, []
     cut = chunks(whole, sizes)
     for number, part in enumerate(cut, 1):
@@ -193,6 +190,14 @@ def test_chunks_do_not_change_the_polyline(sizes):
     streamed, once = join(parts), straighten(whole)
     for name in Polyline.__slots__:
         assert_array_equal(getattr(streamed, name), getattr(once, name), err_msg=name)
+
+
+@pytest.mark.parametrize("sizes", [[1], [3, 0, 1], [64], [50, 7]])
+def test_chunks_do_not_change_the_polyline(sizes):
+    rng = np.random.default_rng(5)
+    points = np.cumsum(rng.normal([0.02, 0.0, 0.0], 0.002, size=(400, 3)), axis=0)
+    whole = lines(points, np.where(np.arange(399) < 150, 40.0, 90.0))
+    assert_chunks_change_nothing(whole, sizes)
 
 
 def zigzag(legs, blocks_per_leg=1):
@@ -214,14 +219,7 @@ def test_noise_is_merged_to_its_end(legs, blocks_per_leg):
 def test_chunks_do_not_change_the_end_of_noise(sizes):
     feeds = np.repeat([40.0, 90.0], [150, 141])
     whole = lines(zigzag(291), feeds)
-    step, state, parts = polyline(MERGING), None, []
-    cut = chunks(whole, sizes)
-    for number, part in enumerate(cut, 1):
-        state, edges = step(state, part, number == len(cut))
-        parts.append(edges)
-    streamed, once = join(parts), straighten(whole)
-    for name in Polyline.__slots__:
-        assert_array_equal(getattr(streamed, name), getattr(once, name), err_msg=name)
+    assert_chunks_change_nothing(whole, sizes)
 
 
 def test_a_smooth_curve_that_turns_both_ways_is_not_noise():

@@ -43,6 +43,7 @@ TWINS = {
     "kernels/jerk_rounding.py": ("naive.highest_below", "test_jerk.py"),
     "kernels/jerk_scan.py": ("naive.rest_to_rest", "test_jerk.py"),
     "kernels/jerk_spline.py": ("BSpline", "test_jerk_optimum.py"),
+    "kernels/jerk_stretch.py": ("optimum.fastest", "test_jerk_optimum.py"),
     "kernels/jerk_windows.py": ("naive.rest_to_rest", "test_jerk_streaming.py"),
     "kernels/kinematics_delta.py": ("naive.trilateration", "test_kinematics.py"),
     "kernels/kinematics_legs.py": ("naive.leg_joints", "test_kinematics.py"),

@@ -82,7 +82,7 @@ def check(
     from cnc_shape.cli.errors import DONE, WRONG_INPUT, error_object, report_error
     from cnc_shape.cli.output import print_json
     from cnc_shape.cli.progress import progress
-    from cnc_shape.cli.reading import limited, named_options
+    from cnc_shape.cli.reading import limited, named_options, sole_program
     from cnc_shape.errors import CncShapeError, OptionError
 
     if jacobian:
@@ -101,7 +101,8 @@ def check(
         line_bytes=max_line_bytes,
         coordinate=max_coordinate_mm,
     )
-    _one_target(files, points)
+    if points is not None:
+        sole_program(files, "--points", points)
     clock: Clock | None = None
     if setup is not None and (time or times is not None):
         from cnc_shape.cli.cycle_time import Clock, check_times
@@ -136,19 +137,6 @@ def _setup(machine: str | None, *, quiet: bool) -> Setup:
     setup = load_machine(machine)
     warn(setup.warnings, quiet=quiet)
     return setup
-
-
-def _one_target(files: list[str], points: str | None) -> None:
-    from cnc_shape.errors import OptionError
-
-    if points is None:
-        return
-    if len(files) > 1 or Path(files[0]).suffix.lower() in MACHINE_SUFFIXES:
-        raise OptionError("--points takes one program", hint="check one file at a time")
-    if Path(points).exists() and Path(files[0]).exists() and Path(points).samefile(files[0]):
-        raise OptionError(
-            f"{points} is the input itself", hint="name another output: inputs are never overwritten"
-        )
 
 
 def _check(file: str, options: ReadingOptions, points: str | None, clock: Clock | None) -> dict[str, Any]:

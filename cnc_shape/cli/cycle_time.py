@@ -8,9 +8,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from cnc_shape.cli.options import MACHINE_SUFFIXES
 from cnc_shape.cli.output import warn
 from cnc_shape.cli.progress import line_by_line, progress
+from cnc_shape.cli.reading import sole_program
 from cnc_shape.config.setup import Setup
 from cnc_shape.cycle_time import ClockState, CycleTime, clocked
 from cnc_shape.errors import OptionError
@@ -49,12 +49,7 @@ def check_times(files: list[str], times: str, *, force: bool) -> Path:
         The file cannot be made there.
     """
     target = Path(times)
-    if len(files) > 1 or Path(files[0]).suffix.lower() in MACHINE_SUFFIXES:
-        raise OptionError("--times takes one program", hint="check one file at a time")
-    if target.exists() and Path(files[0]).exists() and target.samefile(files[0]):
-        raise OptionError(
-            f"{times} is the input itself", hint="name another output: inputs are never overwritten"
-        )
+    sole_program(files, "--times", times)
     check_target(target, force=force)
     return target
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
+from cnc_shape.cli.options import MACHINE_SUFFIXES
 from cnc_shape.errors import OptionError
 from cnc_shape.readers import Curve, ReadingOptions
 from cnc_shape.readers.gcode import Dialect, GcodeOptions
@@ -64,3 +66,19 @@ def limited(
             coordinate=coordinate or limits.coordinate,
         ),
     )
+
+
+def sole_program(files: Sequence[str], option: str, target: str) -> None:
+    """Refuse an option that writes a file about one program where there are more, or where it is the program.
+
+    Raises
+    ------
+    OptionError
+        Several files, a machine file, or a target that is the input.
+    """
+    if len(files) > 1 or Path(files[0]).suffix.lower() in MACHINE_SUFFIXES:
+        raise OptionError(f"{option} takes one program", hint="check one file at a time")
+    if Path(target).exists() and Path(files[0]).exists() and Path(target).samefile(files[0]):
+        raise OptionError(
+            f"{target} is the input itself", hint="name another output: inputs are never overwritten"
+        )

@@ -167,11 +167,12 @@ def tighten(worst, straight_a, tolerances, ease, lower, changed, begin, end):
 
     Parameters
     ----------
-    worst (k,7)
-        Ratios of velocity, acceleration, feed; of jerk where b is 0, rises, falls; and of jerk but for b.
+    worst (k,5)
+        Ratios of acceleration; of jerk where b is 0, rises, falls; and of jerk but for b.
     ease (k,5)
-        Shares of speed, acceleration, jerk by curvature, rising and falling b that may be used.
-    lower (k,5), changed (k,)
+        Shares of speed, acceleration, jerk by curvature, rising and falling b that may be used. That of speed
+        stays.
+    lower (k,4), changed (k,)
         Ones, before and after; and marks of the cells whose shares are lower now.
     begin, end
         Cells to look at.
@@ -181,36 +182,33 @@ def tighten(worst, straight_a, tolerances, ease, lower, changed, begin, end):
     count = straight_a.size
     found = 0
     for k in range(begin, end):
-        fast = max(worst[k, 0], worst[k, 2])
-        if fast > 1.0 + tolerances[0]:
-            lower[k, 0] = EASE_ACCELERATION / fast
-        if worst[k, 1] > 1.0 + tolerances[1]:
-            lower[k, 1] = EASE_ACCELERATION / worst[k, 1]
-        base = worst[k, 6]
-        if max(base, worst[k, 3]) > 1.0 + tolerances[2]:
-            lower[k, 2] = EASE_JERK / max(base, worst[k, 3])
+        if worst[k, 0] > 1.0 + tolerances[1]:
+            lower[k, 0] = EASE_ACCELERATION / worst[k, 0]
+        base = worst[k, 4]
+        if max(base, worst[k, 1]) > 1.0 + tolerances[2]:
+            lower[k, 1] = EASE_JERK / max(base, worst[k, 1])
         for n in range(2):
-            ratio = worst[k, 4 + n]
+            ratio = worst[k, 2 + n]
             if ratio > 1.0 + tolerances[2]:
                 room = (1.0 - base) / (ratio - base) if ratio > base else 1.0
-                lower[k, 3 + n] = EASE_JERK * min(1.0 / ratio, max(room, LEAST_ROOM))
+                lower[k, 2 + n] = EASE_JERK * min(1.0 / ratio, max(room, LEAST_ROOM))
                 if ease[k, 3 + n] < LEAST_EASE:
-                    lower[k, 3 + n] = 1.0
-                    lower[k, 2] = min(lower[k, 2], EASE_JERK / ratio)
+                    lower[k, 2 + n] = 1.0
+                    lower[k, 1] = min(lower[k, 1], EASE_JERK / ratio)
                 if base > MOST_BASE:
-                    lower[k, 2] = min(lower[k, 2], EASE_JERK / ratio**BASE_POWER)
-        for n in range(5):
+                    lower[k, 1] = min(lower[k, 1], EASE_JERK / ratio**BASE_POWER)
+        for n in range(4):
             if lower[k, n] < 1.0:
                 found += 1
                 break
     if found > 0:
         for k in range(max(begin - 1, 0), min(end + 1, count)):
-            for n in range(5):
+            for n in range(4):
                 least = lower[k, n]
-                if n > 0 and straight_a[k] == 0.0:
+                if straight_a[k] == 0.0:
                     least = min(least, min(lower[max(k - 1, 0), n], lower[min(k + 1, count - 1), n]))
                 if least < 1.0:
-                    ease[k, n] *= least
+                    ease[k, 1 + n] *= least
                     changed[k] = 1
         lower[begin:end] = 1.0
     return found

@@ -117,14 +117,13 @@ def along_ratio(rows, along, s, v, a, b, t):
 
 @kernel
 def looked_at(
-    pieces, cell, first_piece, last_piece, straight_a, rows, begin, feed_rate, alone, along, velocity,
-    acceleration, jerk, tolerances, worst,
+    pieces, cell, first_piece, last_piece, straight_a, rows, begin, along, acceleration, jerk, tolerances,
+    worst,
 ):  # fmt: skip
     """The certificate of pieces of a law (`jerk_certificate.certificate`), with that along the path."""
     certificate(
-        pieces, cell, first_piece, last_piece, straight_a, rows, begin, feed_rate, alone, velocity,
-        acceleration, jerk, tolerances, worst,
-    )  # fmt: skip
+        pieces, cell, first_piece, last_piece, straight_a, rows, begin, acceleration, jerk, tolerances, worst
+    )
     if along.size == 0:
         return
     for m in range(first_piece, last_piece):
@@ -135,4 +134,4 @@ def looked_at(
             rows[begin + k], along[begin + k], pieces[m, 2], pieces[m, 3], pieces[m, 4], pieces[m, 5],
             pieces[m, 1],
         )  # fmt: skip
-        worst[k, 1] = max(worst[k, 1], ratio)
+        worst[k, 0] = max(worst[k, 0], ratio)

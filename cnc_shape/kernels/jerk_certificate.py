@@ -81,36 +81,40 @@ def largest_loads(c, s, v, a, b, t, acceleration, jerk, enough_a, enough_j):
     return found_a, found_j
 
 
+@inlined
+def axis_motion(c, i, s, v, a, b):
+    """Velocity, acceleration and jerk of the axis `i` at the place `s` in a cell."""
+    third = 6.0 * c[3, i]
+    bend = 2.0 * c[2, i] + third * s
+    first = c[1, i] + s * (2.0 * c[2, i] + 3.0 * c[3, i] * s)
+    return first * v, first * a + bend * v * v, first * b + v * (3.0 * bend * a + third * v * v)
+
+
 @kernel
 def piece_loads(c, alone, s, v, a, b, velocity, acceleration, jerk, feed_rate, worst):
     """Raise `worst` (4,) to a point's ratios of velocity, acceleration, jerk and feed to their limits."""
     square = 0.0
     for i in range(velocity.size):
-        third = 6.0 * c[3, i]
-        bend = 2.0 * c[2, i] + third * s
-        first = c[1, i] + s * (2.0 * c[2, i] + 3.0 * c[3, i] * s)
-        qv = first * v
+        moving, pushed, jerked = axis_motion(c, i, s, v, a, b)
         if (i < 3) != (alone == 1):
-            square += qv * qv
-        worst[0] = max(worst[0], abs(qv) / velocity[i])
-        worst[1] = max(worst[1], abs(first * a + bend * v * v) / acceleration[i])
-        worst[2] = max(worst[2], abs(first * b + v * (3.0 * bend * a + third * v * v)) / jerk[i])
+            square += moving * moving
+        worst[0] = max(worst[0], abs(moving) / velocity[i])
+        worst[1] = max(worst[1], abs(pushed) / acceleration[i])
+        worst[2] = max(worst[2], abs(jerked) / jerk[i])
     worst[3] = max(worst[3], np.sqrt(square) / feed_rate)
 
 
 @kernel
 def certificate(
-    pieces, cell, begin, end, straight_a, rows, first_cell, feed_rate, alone, velocity, acceleration, jerk,
-    tolerances, worst,
-):  # fmt: skip
-    """Largest ratios (k,7) of what the law asks for to the limits, in the cells of pieces `begin` to `end`.
+    pieces, cell, begin, end, straight_a, rows, first_cell, acceleration, jerk, tolerances, worst
+):
+    """Largest ratios (k,5) of what the law asks for to the limits, in the cells of pieces `begin` to `end`.
 
-    Velocity, acceleration, feed; jerk where the path jerk b is 0, where it is positive, where it is
-    negative; jerk but for that by b. Acceleration and jerks are bounds, as near as it takes to tell them
-    from what is tolerated; jerk but for b is looked for at some points of the pieces of cells with too much.
-    Velocity and feed are 0: a law stays below the envelope, which keeps them. So do straight cells theirs.
+    Acceleration; jerk where the path jerk b is 0, where it is positive, where it is negative; jerk but for
+    that by b. The first four are bounds, as near as it takes to tell them from what is tolerated; the last is
+    looked for at some points of the pieces of cells with too much. Straight cells keep their limits, and a
+    law below the envelope those of velocity and feed: they are not looked at.
     """
-    loads = np.empty(4)
     m = begin
     while m < end:
         k = cell[m]
@@ -128,25 +132,22 @@ def certificate(
                 rows[whole], pieces[n, 2], pieces[n, 3], pieces[n, 4], b, pieces[n, 1], acceleration, jerk,
                 1.0 + tolerances[1], 1.0 + tolerances[2],
             )  # fmt: skip
-            worst[k, 1] = max(worst[k, 1], most_a)
-            kind = 3 if b == 0.0 else (4 if b > 0.0 else 5)
+            worst[k, 0] = max(worst[k, 0], most_a)
+            kind = 1 if b == 0.0 else (2 if b > 0.0 else 3)
             worst[k, kind] = max(worst[k, kind], most_j)
             most = max(most, most_j)
         if most <= 1.0 + tolerances[2]:
             continue
-        loads[:] = 0.0
         for n in range(first, m):
             v = pieces[n, 3]
             a = pieces[n, 4]
             b = pieces[n, 5]
             for p in range(POINTS):
                 e = pieces[n, 1] * p / (POINTS - 1)
-                piece_loads(
-                    rows[whole], alone[whole], pieces[n, 2] + moved(v, a, b, e),
-                    v + e * (a + e * b / 2.0), a + e * b, 0.0, velocity, acceleration, jerk,
-                    feed_rate[whole], loads,
-                )  # fmt: skip
-        worst[k, 6] = loads[2]
+                s = pieces[n, 2] + moved(v, a, b, e)
+                for i in range(jerk.size):
+                    _, _, asked = axis_motion(rows[whole], i, s, v + e * (a + e * b / 2.0), a + e * b, 0.0)
+                    worst[k, 4] = max(worst[k, 4], abs(asked) / jerk[i])
 
 
 @kernel

@@ -16,7 +16,7 @@ from cnc_shape.kernels import inlined, kernel
 from cnc_shape.kernels.jerk_caps import falling_jerk, speed_caps, tighten
 from cnc_shape.kernels.jerk_cells import looked_at, prepared
 from cnc_shape.kernels.jerk_phases import moved
-from cnc_shape.kernels.jerk_pieces import NEAR, cut, index_pieces, more_room, spliced
+from cnc_shape.kernels.jerk_pieces import NEAR, copied, cut, index_pieces, more_room, spliced
 from cnc_shape.kernels.jerk_rounding import round_off
 from cnc_shape.kernels.jerk_scan import PHASES, envelope, mirrored, scan
 
@@ -104,29 +104,19 @@ def joint_speed(pieces, first_piece, cap, node, cells, start):
 
 
 @inlined
-def joint_before(pieces, first_piece, cap, node, cells, start):
-    """The nearest node at or before `node` where the law may be joined, and its speed there."""
+def nearest_joint(pieces, first_piece, cap, node, step, cells, start):
+    """The first node from `node` on, in steps of 1 or -1, where the law may be joined; its speed there."""
     while True:
         speed = joint_speed(pieces, first_piece, cap, node, cells, start)
         if speed >= 0.0:
             return node, speed
-        node -= 1
-
-
-@inlined
-def joint_after(pieces, first_piece, cap, node, cells, start):
-    """The nearest node at or after `node` where the law may be joined, and its speed there."""
-    while True:
-        speed = joint_speed(pieces, first_piece, cap, node, cells, start)
-        if speed >= 0.0:
-            return node, speed
-        node += 1
+        node += step
 
 
 @kernel
 def section_law(
-    rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin, end,
-    entry, calm_begin, calm_end, calm_speed, tolerances, most_rounds,
+    rows, length, limit_v2, straight, along, acceleration, jerk, begin, end, entry, calm_begin, calm_end,
+    calm_speed, tolerances, most_rounds,
 ):  # fmt: skip
     """Time law of the cells `begin` to `end`, from the speed `entry` to rest.
 
@@ -158,9 +148,9 @@ def section_law(
     )
     limits = limit_v2[begin:end]
     ease = np.ones((count, 5))
-    lower = np.ones((count, 5))
+    lower = np.ones((count, 4))
     changed = np.ones(count, np.int64)
-    worst = np.empty((count, 7))
+    worst = np.empty((count, 5))
     top = np.empty(count)
     cap = np.empty(count + 1)
     for k in range(calm_begin, calm_end):
@@ -196,8 +186,8 @@ def section_law(
             high = k
             while high < count and changed[high] == 1:
                 high += 1
-            low, start = joint_before(pieces, first_piece, cap, k, count, entry)
-            high, finish = joint_after(pieces, first_piece, cap, high, count, entry)
+            low, start = nearest_joint(pieces, first_piece, cap, k, -1, count, entry)
+            high, finish = nearest_joint(pieces, first_piece, cap, high, 1, count, entry)
             while True:
                 while made > 0 and low < windows[made - 1, 1]:
                     made -= 1
@@ -215,15 +205,12 @@ def section_law(
                 if low == 0 and high == count:
                     return pieces[:0], cell[:0], cap, work, count
                 grown = high - low
-                low, start = joint_before(pieces, first_piece, cap, max(low - grown, 0), count, entry)
+                low, start = nearest_joint(pieces, first_piece, cap, max(low - grown, 0), -1, count, entry)
                 high = min(high + grown, count)
-                high, finish = joint_after(pieces, first_piece, cap, high, count, entry)
+                high, finish = nearest_joint(pieces, first_piece, cap, high, 1, count, entry)
             if filled + part_cell.size > new_cell.size:
                 new, new_cell = more_room(new, new_cell, part_cell.size)
-            for m in range(part_cell.size):
-                for column in range(6):
-                    new[filled + m, column] = part[m, column]
-                new_cell[filled + m] = part_cell[m]
+            copied(part, part_cell, 0, part_cell.size, 0, new, new_cell, filled)
             starts[made] = start
             windows[made, 0] = low
             windows[made, 1] = high
@@ -240,8 +227,8 @@ def section_law(
             low = windows[n, 0]
             high = windows[n, 1]
             looked_at(
-                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, feed_rate,
-                alone, along, velocity, acceleration, jerk, tolerances, worst,
+                pieces, cell, first_piece[low], first_piece[high], straight_a, rows, begin, along,
+                acceleration, jerk, tolerances, worst,
             )  # fmt: skip
             found += tighten(worst, straight_a, tolerances, ease, lower, changed, low, high)
     return pieces, cell, cap, work, found

@@ -3,11 +3,34 @@
 
 import numpy as np
 
-from cnc_shape.kernels import kernel
+from cnc_shape.kernels import inlined, kernel
 from cnc_shape.kernels.jerk_phases import moved, time_to
 from cnc_shape.kernels.jerk_rounding import SHORTEST
 
 NEAR = 1e-10  # mm or rad, of a node: as good as there
+
+
+@inlined
+def put_piece(pieces, cell, m, t, place, v, a, b, k):
+    """Write a piece, whose time comes later (`timed`)."""
+    pieces[m, 0] = 0.0
+    pieces[m, 1] = t
+    pieces[m, 2] = place
+    pieces[m, 3] = v
+    pieces[m, 4] = a
+    pieces[m, 5] = b
+    cell[m] = k
+
+
+@inlined
+def copied(pieces, cell, low, high, shift, out, out_cell, filled):
+    """Append the pieces `low` to `high`, `shift` added to their cells; returns how many there are then."""
+    for m in range(low, high):
+        for column in range(6):
+            out[filled, column] = pieces[m, column]
+        out_cell[filled] = shift + cell[m]
+        filled += 1
+    return filled
 
 
 @kernel
@@ -57,13 +80,9 @@ def cut(law, law_cell, count, nodes, first, pieces, cell):
             if not (k < last and to_node <= place + near):
                 until = time_to(v, a, b, whole, to_node - place) if inside else whole
             if until - begin >= SHORTEST or (inside and (m == 0 or cell[m - 1] != first + k)):
-                pieces[m, 0] = 0.0
-                pieces[m, 1] = until - begin
-                pieces[m, 2] = 0.0 if begin > 0.0 else max(place - (nodes[k] - origin), 0.0)
-                pieces[m, 3] = max(v + begin * (a + begin * b / 2.0), 0.0)
-                pieces[m, 4] = a + b * begin
-                pieces[m, 5] = b
-                cell[m] = first + k
+                here = 0.0 if begin > 0.0 else max(place - (nodes[k] - origin), 0.0)
+                speed = max(v + begin * (a + begin * b / 2.0), 0.0)
+                put_piece(pieces, cell, m, until - begin, here, speed, a + b * begin, b, first + k)
                 m += 1
             if not inside:
                 break
@@ -71,13 +90,10 @@ def cut(law, law_cell, count, nodes, first, pieces, cell):
             begin = until
     while m > 0 and cell[m - 1] < first + last:  # cells at the end that are shorter than rounding
         t = pieces[m - 1, 1]
-        pieces[m, 0] = 0.0
-        pieces[m, 1] = 0.0
-        pieces[m, 2] = 0.0
-        pieces[m, 3] = max(pieces[m - 1, 3] + t * (pieces[m - 1, 4] + t * pieces[m - 1, 5] / 2.0), 0.0)
-        pieces[m, 4] = pieces[m - 1, 4] + t * pieces[m - 1, 5]
-        pieces[m, 5] = 0.0
-        cell[m] = cell[m - 1] + 1
+        speed = max(pieces[m - 1, 3] + t * (pieces[m - 1, 4] + t * pieces[m - 1, 5] / 2.0), 0.0)
+        put_piece(
+            pieces, cell, m, 0.0, 0.0, speed, pieces[m - 1, 4] + t * pieces[m - 1, 5], 0.0, cell[m - 1] + 1
+        )
         m += 1
     return m
 
@@ -88,10 +104,7 @@ def more_room(out, out_cell, count):
     size = out_cell.size
     more = np.empty((2 * size + count, 6))
     more_cell = np.empty(2 * size + count, np.int64)
-    for n in range(size):
-        for column in range(6):
-            more[n, column] = out[n, column]
-        more_cell[n] = out_cell[n]
+    copied(out, out_cell, 0, size, 0, more, more_cell, 0)
     return more, more_cell
 
 
@@ -124,16 +137,8 @@ def spliced(pieces, cell, first_piece, windows, count, new, new_cell):
     here = 0
     for n in range(count + 1):
         until = first_piece[windows[n, 0]] if n < count else cell.size
-        for m in range(here, until):
-            for column in range(6):
-                out[filled, column] = pieces[m, column]
-            out_cell[filled] = cell[m]
-            filled += 1
+        filled = copied(pieces, cell, here, until, 0, out, out_cell, filled)
         if n < count:
-            for m in range(windows[n, 2], windows[n, 3]):
-                for column in range(6):
-                    out[filled, column] = new[m, column]
-                out_cell[filled] = new_cell[m]
-                filled += 1
+            filled = copied(new, new_cell, windows[n, 2], windows[n, 3], 0, out, out_cell, filled)
             here = first_piece[windows[n, 1]]
     return out, out_cell

@@ -50,10 +50,7 @@ def straight_phases(distance, v, a, b, law, cell):
 
 
 @kernel
-def slow_law(
-    rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin, end,
-    tolerances,
-):  # fmt: skip
+def slow_law(rows, length, limit_v2, straight, along, acceleration, jerk, begin, end, tolerances):
     """Pieces of a law of the cells `begin` to `end` from rest to rest, their cells counted from `begin`."""
     count = end - begin
     size, first, _, _, limits, straight_a, _ = prepared(
@@ -78,16 +75,12 @@ def slow_law(
     cell = np.empty(PHASES + 2 * count + 1, np.int64)
     none = np.int64(0)
     m = cut(law, law_cell, w, nodes, none, pieces, cell)
-    worst = np.zeros((count, 7))
-    looked_at(
-        pieces, cell, none, m, straight_a, rows, begin, feed_rate, alone, along, velocity, acceleration,
-        jerk, tolerances, worst,
-    )  # fmt: skip
+    worst = np.zeros((count, 5))
+    looked_at(pieces, cell, none, m, straight_a, rows, begin, along, acceleration, jerk, tolerances, worst)
     share = 1.0
     for k in range(count):
-        share = min(share, 1.0 / max(1.0, max(worst[k, 0], worst[k, 2])))
-        share = min(share, 1.0 / np.sqrt(max(1.0, worst[k, 1])))
-        share = min(share, 1.0 / np.cbrt(max(1.0, max(worst[k, 3], max(worst[k, 4], worst[k, 5])))))
+        share = min(share, 1.0 / np.sqrt(max(1.0, worst[k, 0])))
+        share = min(share, 1.0 / np.cbrt(max(1.0, max(worst[k, 1], max(worst[k, 2], worst[k, 3])))))
     if share < 1.0:
         share *= 1.0 - SLACK
     for n in range(m):

@@ -73,12 +73,7 @@ def scan(
             to_top = 2.0 * (top[k] - v) / (a + np.sqrt(a * a + 2.0 * steep * (top[k] - v)))
             to_exit = travel_time(v, a, steep, left)
             t = min(to_high, to_top, to_exit)
-            phases[m, 0] = t
-            phases[m, 1] = h - left
-            phases[m, 2] = v
-            phases[m, 3] = a
-            phases[m, 4] = steep
-            cell[m] = k
+            put(phases, cell, m, t, h - left, v, a, steep, k)
             m += 1
             if t == to_exit:
                 left = 0.0
@@ -96,12 +91,7 @@ def scan(
             to_top = (top[k] - v) / a
             to_exit = travel_time(v, a, 0.0, left)
             t = min(to_top, to_exit)
-            phases[m, 0] = t
-            phases[m, 1] = h - left
-            phases[m, 2] = v
-            phases[m, 3] = a
-            phases[m, 4] = 0.0
-            cell[m] = k
+            put(phases, cell, m, t, h - left, v, a, 0.0, k)
             m += 1
             if t == to_exit:
                 left = 0.0
@@ -111,12 +101,7 @@ def scan(
                 v = top[k]
                 a = 0.0
         if left > 0.0:
-            phases[m, 0] = left / v
-            phases[m, 1] = h - left
-            phases[m, 2] = v
-            phases[m, 3] = 0.0
-            phases[m, 4] = 0.0
-            cell[m] = k
+            put(phases, cell, m, left / v, h - left, v, 0.0, 0.0, k)
             m += 1
             a = 0.0
         limit = cap[k + 1]
@@ -126,12 +111,7 @@ def scan(
                 a = 0.0
             elif limit <= entry_v:
                 m = before
-                phases[m, 0] = h / entry_v
-                phases[m, 1] = 0.0
-                phases[m, 2] = entry_v
-                phases[m, 3] = 0.0
-                phases[m, 4] = 0.0
-                cell[m] = k
+                put(phases, cell, m, h / entry_v, 0.0, entry_v, 0.0, 0.0, k)
                 m += 1
                 v = limit
                 a = 0.0
@@ -155,12 +135,7 @@ def scan(
                     b = 0.0
                     a = (limit - entry_v) * (limit + entry_v) / (2.0 * h)
                     t = 2.0 * h / (limit + entry_v)
-                phases[m, 0] = t
-                phases[m, 1] = 0.0
-                phases[m, 2] = entry_v
-                phases[m, 3] = a
-                phases[m, 4] = b
-                cell[m] = k
+                put(phases, cell, m, t, 0.0, entry_v, a, b, k)
                 m += 1
                 v = limit
                 a += b * t

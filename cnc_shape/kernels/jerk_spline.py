@@ -9,6 +9,7 @@ import numpy as np
 
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_phases import moved
+from cnc_shape.kernels.jerk_pieces import put_piece
 from cnc_shape.kernels.speed_limits import ends
 
 MOST_STEPS = 30
@@ -204,19 +205,6 @@ def two_phases(v0, a0, v1, a1, h1, h2, b, out):
 
 
 @kernel
-def put_phase(v, a, b, t, at, cell, pieces, cells, m):
-    """Write a piece; returns the number of pieces then."""
-    pieces[m, 0] = 0.0
-    pieces[m, 1] = t
-    pieces[m, 2] = at
-    pieces[m, 3] = v
-    pieces[m, 4] = a
-    pieces[m, 5] = b
-    cells[m] = cell
-    return m + 1
-
-
-@kernel
 def spline_phases(c, place, border, centre, at, at_cell, pieces, cell):
     """Phases of a spline as pieces (m,6), two for every segment, cut at the nodes; 0 where there are none."""
     n = place.size
@@ -248,17 +236,20 @@ def spline_phases(c, place, border, centre, at, at_cell, pieces, cell):
             if left <= half:
                 if left > 0.0:
                     begin, v1, a1 = after(v, a, b, left, t * left / half)
-                    filled = put_phase(v, a, b, begin, here, own, pieces, cell, filled)
+                    put_piece(pieces, cell, filled, begin, here, v, a, b, own)
+                    filled += 1
                     v = v1
                     a = a1
                 own = at_cell[s]
                 here = at[s]
                 left = half - left
-                filled = put_phase(v, a, b, max(t - begin, 0.0), here, own, pieces, cell, filled)
+                put_piece(pieces, cell, filled, max(t - begin, 0.0), here, v, a, b, own)
+                filled += 1
                 here += left
                 left = np.inf
             else:
-                filled = put_phase(v, a, b, t, here, own, pieces, cell, filled)
+                put_piece(pieces, cell, filled, t, here, v, a, b, own)
+                filled += 1
                 here += half
                 left -= half
     return filled

@@ -16,7 +16,7 @@ import numpy as np
 
 from cnc_shape.kernels import kernel
 from cnc_shape.kernels.jerk_law import NO_ACCELERATION, section_law
-from cnc_shape.kernels.jerk_pieces import index_pieces, more_room
+from cnc_shape.kernels.jerk_pieces import copied, index_pieces, more_room, put_piece
 from cnc_shape.kernels.jerk_rescue import slow_law
 
 SAME_CAP = 1e-9  # -, of a speed that is the node's own cap
@@ -69,7 +69,7 @@ def window_end(rows, length, stop, limit_v2, acceleration, jerk, at, last, windo
 
 
 @kernel
-def last_joint(pieces, cell, cap, count):
+def last_joint(pieces, cell, cap):
     """The last node that the law passes without acceleration at its cap, and the speed; 0 without one."""
     for m in range(cell.size - 1, 0, -1):
         node = cell[m]
@@ -138,10 +138,7 @@ def released(pieces, cell, until, at, out, out_cell, filled, spans, count):
         size += 1
     if filled + size > out_cell.size:
         out, out_cell = more_room(out, out_cell, size)
-    for n in range(size):
-        for column in range(6):
-            out[filled + n, column] = pieces[n, column]
-        out_cell[filled + n] = at + cell[n]
+    copied(pieces, cell, 0, size, at, out, out_cell, filled)
     spans[count, 0] = at
     spans[count, 1] = at + until
     spans[count, 2] = filled
@@ -154,16 +151,14 @@ def waited(duration, at, out, out_cell, filled):
     """Append a rest at the start of the cell `at`; returns the arrays and how many pieces they hold."""
     if filled == out_cell.size:
         out, out_cell = more_room(out, out_cell, 1)
-    out[filled] = 0.0
-    out[filled, 1] = duration
-    out_cell[filled] = at
+    put_piece(out, out_cell, filled, duration, 0.0, 0.0, 0.0, 0.0, at)
     return out, out_cell, filled + 1
 
 
 @kernel
 def windows_law(
-    rows, length, stop, dwell, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk,
-    tolerances, most_rounds, last, window, ahead, held, held_cell, marks, speeds, counts,
+    rows, length, stop, dwell, limit_v2, straight, along, acceleration, jerk, tolerances, most_rounds, last,
+    window, ahead, held, held_cell, marks, speeds, counts,
 ):  # fmt: skip
     """Time law of as much of a path as is final.
 
@@ -178,7 +173,8 @@ def windows_law(
     marks (2,), speeds (2,)
         Its joint and its end; speeds at its start and at the joint. Changed. A joint of 0: nothing is held.
     counts (6,)
-        What has been done so far: cells planned, joints made, windows planned as one, rests, cells slowed.
+        What has been done so far: cells planned, tries to keep one speed, windows planned as one, rests and
+        halvings, cells slowed; and one for `jerk_stretch`.
 
     Returns
     -------
@@ -217,8 +213,8 @@ def windows_law(
         entry = speeds[1] if marks[0] > 0 else 0.0
         known = 0  # joint from which the law has been sought in vain
         pieces, cell, cap, work, found = section_law(
-            rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, begin,
-            end, entry, nothing, nothing, 0.0, tolerances, most_rounds,
+            rows, length, limit_v2, straight, along, acceleration, jerk, begin, end,
+            entry, nothing, nothing, 0.0, tolerances, most_rounds,
         )  # fmt: skip
         counts[PLANNED] += work
         if found == 0 and marks[0] > 0:
@@ -231,8 +227,8 @@ def windows_law(
             entry = speeds[0]
             known = marks[0]
             pieces, cell, cap, work, found = section_law(
-                rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
-                end, entry, nothing, nothing, 0.0, tolerances, most_rounds,
+                rows, length, limit_v2, straight, along, acceleration, jerk, at, end,
+                entry, nothing, nothing, 0.0, tolerances, most_rounds,
             )  # fmt: skip
             counts[PLANNED] += work
             if found > 0:
@@ -249,9 +245,8 @@ def windows_law(
             continue
         elif found > 0:
             pieces, cell = slow_law(
-                rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
-                end, tolerances,
-            )  # fmt: skip
+                rows, length, limit_v2, straight, along, acceleration, jerk, at, end, tolerances
+            )
             counts[SLOWED] += end - at
             rests = True
         if marks[0] == 0 and dwell[at] > 0.0:
@@ -264,7 +259,7 @@ def windows_law(
             )
             at = end
             continue
-        joint, speed = last_joint(pieces, cell, cap, end - at)
+        joint, speed = last_joint(pieces, cell, cap)
         wide = 1.0
         for _ in range(CALM_TRIES):
             if joint > known:
@@ -277,12 +272,12 @@ def windows_law(
                 break
             counts[CALMED] += 1
             calmed, calmed_cell, calmed_cap, work, found = section_law(
-                rows, length, feed_rate, alone, limit_v2, straight, along, velocity, acceleration, jerk, at,
-                end, entry, low, high, calm, tolerances, most_rounds,
+                rows, length, limit_v2, straight, along, acceleration, jerk, at, end,
+                entry, low, high, calm, tolerances, most_rounds,
             )  # fmt: skip
             counts[PLANNED] += work
             if found == 0:
-                joint, speed = last_joint(calmed, calmed_cell, calmed_cap, end - at)
+                joint, speed = last_joint(calmed, calmed_cell, calmed_cap)
                 if joint > known:
                     pieces = calmed
                     cell = calmed_cell

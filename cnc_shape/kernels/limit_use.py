@@ -11,6 +11,7 @@ axis.
 import numpy as np
 
 from cnc_shape.kernels import kernel
+from cnc_shape.kernels.jerk_certificate import axis_motion
 from cnc_shape.kernels.jerk_phases import moved
 
 POINTS = 9  # of every piece at least, as many as the certificate looks at
@@ -31,17 +32,14 @@ def point_use(c, s, v, a, b, alone, feed_rate, row):
     tool = 0.0
     turning = 0.0
     for i in range(axes):
-        third = 6.0 * c[3, i]
-        bend = 2.0 * c[2, i] + third * s
-        first = c[1, i] + s * (2.0 * c[2, i] + 3.0 * c[3, i] * s)
-        qv = first * v
+        moving, pushed, jerked = axis_motion(c, i, s, v, a, b)
         if i < 3:
-            tool += qv * qv
+            tool += moving * moving
         else:
-            turning += qv * qv
-        row[4 + i] = abs(qv)
-        row[4 + axes + i] = abs(first * a + bend * v * v)
-        row[4 + 2 * axes + i] = abs(first * b + v * (3.0 * bend * a + third * v * v))
+            turning += moving * moving
+        row[4 + i] = abs(moving)
+        row[4 + axes + i] = abs(pushed)
+        row[4 + 2 * axes + i] = abs(jerked)
     speed = np.sqrt(tool)
     row[0] = speed
     row[1] = -speed
